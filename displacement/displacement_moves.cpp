@@ -78,6 +78,8 @@ VertexMove DisplacementSet::vertex_move_of(const Use& use,
     *parts = lattices_make(
         use.mesh, [&](Vec3f a, Vec3f b) { return seen(a, b) / kDividedCells; }, options.require,
         use.settings.most_cells);
+    // Another picture may have room for the mesh of the same triangles: what is chosen stays.
+    if (fits_in_tiles(use, options, *parts, allowance, used_bytes)) return VertexMove::kNone;
     const std::uint64_t bytes = divided_mesh_bytes(use.mesh, *parts);
     if (bytes > allowance - std::min(allowance, *used_bytes)) {
       parts->clear();
@@ -206,8 +208,12 @@ std::unique_ptr<PreparedMesh> DisplacementSet::make_tiled(const Use& use, std::v
   displaced->name = use.mesh_name;
   displaced->displacement_index = use.displacement_index;
   displaced->mesh_index = use.mesh_index;
-  displaced->tiles = std::make_unique<PointTiles>(use.mesh, use.heights->moves, std::move(parts),
-                                                  use.settings.smoothing, *tile_cache_, num_tiles_);
+  const DisplacementSettings& settings = use.settings;
+  PointMover mover = settings.by_vectors
+                         ? point_mover_make(use.heights->moves)
+                         : point_mover_make(use.heights->source, {use.scale, settings.midlevel, settings.smoothing});
+  displaced->tiles = std::make_unique<PointTiles>(use.mesh, std::move(mover), std::move(parts), settings.smoothing,
+                                                  *tile_cache_, num_tiles_);
   num_tiles_ += displaced->tiles->num_tiles();
   displaced->geometry.tiles = displaced->tiles.get();
   return displaced;

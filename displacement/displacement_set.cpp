@@ -103,7 +103,7 @@ DisplacementSet::DisplacementSet(const DisplacementInput& input, const Displacem
     }
     places.emplace_back(static_cast<int>(geometries_.size()), -1);
     if (use.heights != nullptr) {
-      geometries_.push_back(use.settings.by_vectors ? make_tiled(use, std::move(parts)) : make_computed(use, options));
+      geometries_.push_back(parts.empty() ? make_computed(use, options) : make_tiled(use, std::move(parts)));
       continue;
     }
     geometries_.push_back(make_displaced(use, options));

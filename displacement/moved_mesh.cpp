@@ -271,15 +271,11 @@ MovedMesh move_own(const MeshView& mesh,
   return out;
 }
 
-/// @param move    where eight points of a triangle go: (triangle, their weights, their places, their normals, receives where)
-/// @param along   vertices move with those of one place and normal alone, not with all of one place
-/// @param smooth  they have normals
-template <typename Move>
+/// @param smooth  vertices have normals
 MovedMesh move_divided(const MeshView& mesh,
                        std::span<const LatticeTriangle> parts,
-                       bool along,
                        bool smooth,
-                       const Move& move)
+                       const PointMover& mover)
 {
   const auto out = std::make_shared<DividedMesh>();
   std::vector<std::uint32_t> first_vertex(parts.size() + 1), first_triangle(parts.size() + 1);
@@ -312,7 +308,7 @@ MovedMesh move_divided(const MeshView& mesh,
         N[lane] =
             as_normal(lattice_corner(w, as_vector(mesh.N[t.v0]), as_vector(mesh.N[t.v1]), as_vector(mesh.N[t.v2])));
       }
-      move(part.base, b, P, N, P_moved);
+      mover.move(part.base, b, P, N, P_moved);
       for (std::size_t lane = 0; lane < std::min<std::size_t>(8, weights.size() - first); ++lane) {
         const std::size_t vertex = first_vertex[k] + first + lane;
         base_P[vertex] = P[lane];
@@ -324,9 +320,9 @@ MovedMesh move_divided(const MeshView& mesh,
     divide(part.n, first_vertex[k], out->triangles.data() + first_triangle[k]);
   });
   std::vector<std::uint32_t> of_lines, of_places;
-  if (along || smooth) of_lines = weld_vertices(base_P, base_N);
-  if (!along) of_places = weld_places(base_P);
-  const std::vector<std::uint32_t>& stands_for = along ? of_lines : of_places;
+  if (mover.along || smooth) of_lines = weld_vertices(base_P, base_N);
+  if (!mover.along) of_places = weld_places(base_P);
+  const std::vector<std::uint32_t>& stands_for = mover.along ? of_lines : of_places;
   for (std::size_t vertex = 0; vertex < num_vertices; ++vertex) moved.P[vertex] = moved.P[stands_for[vertex]];
   if (smooth) {
     moved.N = std::move(base_N);
@@ -337,6 +333,25 @@ MovedMesh move_divided(const MeshView& mesh,
 }
 
 }  // namespace
+
+PointMover point_mover_make(const HeightSource& source, const VertexDisplacement& by)
+{
+  return {[source, by](std::uint32_t triangle, const float(*b)[8], const Vec3f* P, const Normal3f* N, Vec3f* moved) {
+            float h[8];
+            source.eval(source.owner, triangle, b, h);
+            for (int k = 0; k < 8; ++k) moved[k] = moved_point(P[k], as_vector(N[k]), h[k], by);
+          },
+          true};
+}
+
+PointMover point_mover_make(const PointMoves& moves)
+{
+  return {[moves](std::uint32_t triangle, const float(*b)[8], const Vec3f* P, const Normal3f*, Vec3f* moved) {
+            moves.eval(moves.owner, triangle, b, moved);
+            for (int k = 0; k < 8; ++k) moved[k] = P[k] + moved[k];
+          },
+          false};
+}
 
 MovedMesh moved_mesh_make(const MeshView& mesh, const CornerHeights& heights, const VertexDisplacement& by)
 {
@@ -378,12 +393,7 @@ MovedMesh divided_mesh_make(const MeshView& mesh,
                             std::span<const LatticeTriangle> parts,
                             const VertexDisplacement& by)
 {
-  return move_divided(mesh, parts, true, by.smooth,
-                      [&](std::uint32_t triangle, const float(*b)[8], const Vec3f* P, const Normal3f* N, Vec3f* moved) {
-                        float h[8];
-                        source.eval(source.owner, triangle, b, h);
-                        for (int k = 0; k < 8; ++k) moved[k] = moved_point(P[k], as_vector(N[k]), h[k], by);
-                      });
+  return move_divided(mesh, parts, by.smooth, point_mover_make(source, by));
 }
 
 MovedMesh divided_mesh_make(const MeshView& mesh,
@@ -393,12 +403,7 @@ MovedMesh divided_mesh_make(const MeshView& mesh,
                             std::span<const MeshShape> steps)
 {
   smooth = smooth && mesh.N != nullptr;
-  MovedMesh out =
-      move_divided(mesh, parts, false, smooth,
-                   [&](std::uint32_t triangle, const float(*b)[8], const Vec3f* P, const Normal3f*, Vec3f* moved) {
-                     moves.eval(moves.owner, triangle, b, moved);
-                     for (int k = 0; k < 8; ++k) moved[k] = P[k] + moved[k];
-                   });
+  MovedMesh out = move_divided(mesh, parts, smooth, point_mover_make(moves));
   if (steps.empty()) return out;
   std::vector<Vec3f> base_P;
   std::vector<Normal3f> base_N;

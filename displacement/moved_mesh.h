@@ -36,6 +36,20 @@ struct PointMoves {
   void (*eval_corners)(const void* owner, const std::uint32_t* corners, Vec3f* moves) = nullptr;
 };
 
+/// Where eight points of one triangle go. Called from many threads at once.
+/// @param b      weights of vertices 0, 1 and 2
+/// @param P      their places, like
+/// @param N      their normals linear in the weights; not used by vectors
+/// @param moved  receives where they go
+using MovePoints =
+    std::function<void(std::uint32_t triangle, const float (*b)[8], const Vec3f* P, const Normal3f* N, Vec3f* moved)>;
+
+/// By what divided meshes and tiles of them move points.
+struct PointMover {
+  MovePoints move;
+  bool along;  ///< normals: points of one place and normal move together, not all of one place
+};
+
 struct DividedMesh;
 
 /// Vertices and normals of a moved mesh at one time.
@@ -66,6 +80,10 @@ struct VertexDisplacement {
   /// It is shaded smooth: a vertex has the mean of the unit normals of the triangles around it, as in Cycles.
   bool smooth = false;
 };
+
+/// @return  what reads the source, which must outlive it
+PointMover point_mover_make(const HeightSource& source, const VertexDisplacement& by);
+PointMover point_mover_make(const PointMoves& moves);
 
 /// Moves the vertices of a mesh along their normals. Vertices of one place and normal move together, by the height at the
 /// first corner of a triangle that has them: texture seams stay closed.

@@ -106,13 +106,13 @@ class PointTiles::Points {
 };
 
 PointTiles::PointTiles(const MeshView& mesh,
-                       const PointMoves& moves,
+                       PointMover mover,
                        std::vector<LatticeTriangle> parts,
                        bool smooth,
                        PointTileCache& cache,
                        std::uint64_t keys)
     : mesh_(mesh),
-      moves_(moves),
+      mover_(std::move(mover)),
       parts_(std::move(parts)),
       smooth_(smooth && mesh.N != nullptr),
       bounds_(box_empty()),
@@ -128,11 +128,11 @@ PointTiles::PointTiles(const MeshView& mesh,
   tbb::parallel_for(std::size_t{0}, P.size(), [&](std::size_t k) {
     const LatticeTriangle& part = parts_[k / 3];
     P[k] = corner_of(mesh_.P, mesh_.triangles[part.base], part.corner[k % 3]);
-    if (smooth_) N[k] = corner_of(mesh_.N, mesh_.triangles[part.base], part.corner[k % 3]);
+    if (smooth_ || mover_.along) N[k] = corner_of(mesh_.N, mesh_.triangles[part.base], part.corner[k % 3]);
   });
-  corners_ = shared(weld_vertices(P, std::vector<Normal3f>(P.size())));
+  corners_ = shared(weld_vertices(P, mover_.along ? N : std::vector<Normal3f>(P.size())));
   sides_ = shared(weld_edges(corners_.first));
-  if (smooth_) {
+  if (smooth_ && !mover_.along) {
     SharedByParts with_normals = shared(weld_vertices(P, N));
     if (with_normals.first != corners_.first) {
       smooth_sides_ = shared(weld_edges(with_normals.first));
@@ -252,16 +252,18 @@ void PointTiles::eval(const Source* sources, std::size_t count, Vec3f* P) const
     std::size_t end = first + 1;
     while (end < count && end < first + 8 && sources[end].base == base) ++end;
     float b[3][8];
-    Vec3f moves[8];
+    Vec3f P_base[8], moved[8];
+    Normal3f N[8];
     for (std::size_t lane = 0; lane < 8; ++lane) {
       const Vec2f w = sources[std::min(first + lane, end - 1)].weights;
       b[0][lane] = static_cast<float>(1.0 - static_cast<double>(w.x) - static_cast<double>(w.y));
       b[1][lane] = w.x;
       b[2][lane] = w.y;
+      P_base[lane] = corner_of(mesh_.P, mesh_.triangles[base], w);
+      if (mover_.along) N[lane] = corner_of(mesh_.N, mesh_.triangles[base], w);
     }
-    moves_.eval(moves_.owner, base, b, moves);
-    for (std::size_t k = first; k < end; ++k)
-      P[k] = corner_of(mesh_.P, mesh_.triangles[base], sources[k].weights) + moves[k - first];
+    mover_.move(base, b, P_base, N, moved);
+    for (std::size_t k = first; k < end; ++k) P[k] = moved[k - first];
     first = end;
   }
 }

@@ -1,5 +1,5 @@
-// A mesh whose points move anywhere, traced without being tessellated: the triangles of its lattices as DividedMesh has them, to the
-// bit, but in tiles that are made when rays ask for them (point_tile.h). What is kept of a tile that is not there is its box.
+// A mesh whose points move, anywhere or along its normals, traced without being tessellated: the triangles of its lattices as
+// DividedMesh has them, to the bit, but in tiles that are made when rays ask for them (point_tile.h). What is kept of a tile that is not there is its box.
 //
 // Embree has a primitive a tile, with a box that holds it exactly; all points are evaluated once for that, a tenth of what building
 // a tree over their triangles takes.
@@ -24,7 +24,7 @@ struct SharedByParts {
 
 class PointTiles {
  public:
-  /// @param mesh    like what moves it must outlive the tiles
+  /// @param mesh    like what moves it must outlive the tiles; with normals, if it moves along them
   /// @param parts   of its triangles
   /// @param smooth  it has normals, as VertexDisplacement::smooth
   /// @param cache   of all such meshes of a scene; must outlive the tiles
@@ -32,7 +32,7 @@ class PointTiles {
   /// @error std::length_error if there are more tiles than Embree can count
   /// @cost  evaluates all points; parallel over tiles
   PointTiles(const MeshView& mesh,
-             const PointMoves& moves,
+             PointMover mover,
              std::vector<LatticeTriangle> parts,
              bool smooth,
              PointTileCache& cache,
@@ -83,7 +83,7 @@ class PointTiles {
   Source source(std::uint32_t part, std::int32_t i, std::int32_t j) const;
   void eval(const Source* sources, std::size_t count, Vec3f* P) const;
   void make(const Tile& at, PointTile* tile) const;
-  /// Whether a part's corners are in three places. Others are lines, as their points move by place, and have no tiles.
+  /// Whether a part's corners move apart. Others are lines, and have no tiles.
   bool has_area(std::uint32_t part) const;
   std::uint32_t tile_of(std::uint32_t part, std::int32_t i, std::int32_t j) const;
   MicroTriangle micro_triangle(std::uint32_t tile, EmbreeHitRecord record) const;
@@ -100,13 +100,13 @@ class PointTiles {
   Vec3d smooth_normal(Points& points, std::uint32_t part, std::int32_t i, std::int32_t j) const;
 
   MeshView mesh_;
-  PointMoves moves_;
+  PointMover mover_;
   std::vector<LatticeTriangle> parts_;
   std::vector<std::uint32_t> first_tile_;  ///< of each part
   std::vector<Tile> tiles_;
   std::vector<Box3> boxes_;
-  SharedByParts corners_, sides_;                ///< at one place
-  SharedByParts smooth_corners_, smooth_sides_;  ///< with one normal as well; empty: those are the same
+  SharedByParts corners_, sides_;  ///< whose points move together: those at one place, or along one normal there
+  SharedByParts smooth_corners_, smooth_sides_;  ///< with one normal there; empty: those are the same
   bool smooth_;
   Box3 bounds_;
   float pad_ = 0;

@@ -47,7 +47,8 @@ class TileTracer : public VectorTracer {
   {
     const double start_seconds = processor_seconds();
     const MeshView mesh = scene.base().mesh();
-    tiles_ = std::make_unique<PointTiles>(mesh, scene.moves(), lattices_make(mesh, scene.cells()), false, cache_, 0);
+    tiles_ = std::make_unique<PointTiles>(mesh, point_mover_make(scene.moves()), lattices_make(mesh, scene.cells()),
+                                          false, cache_, 0);
     geometry_.tiles = tiles_.get();
     const RTCDevice device = start();
     commit(tessellation_scene_make(device, {RTC_BUILD_QUALITY_HIGH, false}),

@@ -1,4 +1,4 @@
-// Points that vectors move, in tiles that rays ask for: the points, boxes, hits and normals of the mesh that divides the same lattices.
+// Points that vectors or heights move, in tiles that rays ask for: the points, boxes, hits and normals of the mesh that divides the same lattices.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -57,13 +57,26 @@ Vec3d curl(Vec3d P, std::uint32_t, double)
   return .06 * Vec3d{std::sin(2 * wave), std::cos(wave + 5 * P.z), std::sin(wave) * std::cos(3 * P.y)};
 }
 
-/// A torus around the z axis, of a few triangles, whose points move. Its first row has a cut, where normals differ.
+/// Heights from −.75 to 1.25.
+Vec3d waves(Vec3d P, std::uint32_t, double)
+{
+  return {.25 + std::sin(11 * P.x + 5 * P.z) * std::cos(9 * P.y - 7 * P.z), 0, 0};
+}
+
+struct TorusParts {
+  bool has_line = true;  ///< one of its triangles has two corners in one place
+  bool has_cut = true;   ///< its first row has normals of its own
+};
+
+/// A torus around the z axis, of a few triangles, whose points move.
 class MovedTorus {
  public:
   static constexpr int kNumAround = 6, kNumTube = 5;
   static constexpr double kRadius = 1, kTube = .4;
 
-  MovedTorus(Move move, const CellsAlong& cells, bool has_line = true) : move_(std::move(move)), has_line_(has_line)
+  /// @param along  points move along normals, by what `move` gives along x
+  MovedTorus(Move move, bool along, const CellsAlong& cells, TorusParts has = {})
+      : move_(std::move(move)), along_(along), has_line_(has.has_line)
   {
     const auto corner = [&](int i, int j, bool turned) {
       const double phi = 2 * kPi * (i % kNumAround) / kNumAround, psi = 2 * kPi * (j % kNumTube) / kNumTube;
@@ -74,7 +87,7 @@ class MovedTorus {
     };
     for (int i = 0; i < kNumAround; ++i) {
       for (int j = 0; j < kNumTube; ++j) {
-        const bool cut = i == 0 && j < 2;
+        const bool cut = has.has_cut && i == 0 && j < 2;
         const std::uint32_t a = corner(i, j, cut), b = corner(i + 1, j, cut), c = corner(i + 1, j + 1, cut),
                             d = corner(i, j + 1, cut);
         triangles_.push_back({a, b, c});
@@ -90,7 +103,8 @@ class MovedTorus {
     mesh_.num_vertices = static_cast<std::uint32_t>(P_.size());
     mesh_.num_triangles = static_cast<std::uint32_t>(triangles_.size());
     parts_ = lattices_make(mesh_, cells);
-    whole_ = divided_mesh_make(mesh_, moves(), parts_, true, {});
+    whole_ = along_ ? divided_mesh_make(mesh_, heights(), parts_, by())
+                    : divided_mesh_make(mesh_, moves(), parts_, true, {});
     view_ = whole_.view(mesh_);
     for (const LatticeTriangle& part : parts_) {
       const auto n = static_cast<std::uint32_t>(part.n);
@@ -101,24 +115,10 @@ class MovedTorus {
   MovedTorus(const MovedTorus&) = delete;
   MovedTorus& operator=(const MovedTorus&) = delete;
 
-  PointMoves moves() const
-  {
-    return {this,
-            [](const void* owner, std::uint32_t triangle, const float(*b)[8], Vec3f* moves) {
-              const auto& self = *static_cast<const MovedTorus*>(owner);
-              const TriangleIndices& t = self.triangles_[triangle];
-              for (int k = 0; k < 8; ++k) {
-                const Vec3d P = static_cast<double>(b[0][k]) * to_double(self.P_[t.v0]) +
-                                static_cast<double>(b[1][k]) * to_double(self.P_[t.v1]) +
-                                static_cast<double>(b[2][k]) * to_double(self.P_[t.v2]);
-                moves[k] = to_float(self.move_(P, triangle, static_cast<double>(b[1][k])));
-              }
-            },
-            nullptr};
-  }
   std::unique_ptr<PointTiles> tiled(PointTileCache& cache) const
   {
-    return std::make_unique<PointTiles>(mesh_, moves(), parts_, true, cache, 5);
+    PointMover mover = along_ ? point_mover_make(heights(), by()) : point_mover_make(moves());
+    return std::make_unique<PointTiles>(mesh_, std::move(mover), parts_, true, cache, 5);
   }
   const std::vector<LatticeTriangle>& parts() const { return parts_; }
   /// A triangle without area; ~0: there is none.
@@ -128,7 +128,7 @@ class MovedTorus {
   {
     return first_vertex_[part] + static_cast<std::uint32_t>(j * (parts_[part].n + 1) - j * (j - 1) / 2 + i);
   }
-  /// A point within the torus, however it is displaced by `curl`.
+  /// A point within the torus, however it is displaced by `curl` or `waves`.
   static Vec3d inside(std::mt19937_64& random)
   {
     const double phi = between(random, 0, 2 * kPi);
@@ -136,8 +136,34 @@ class MovedTorus {
   }
 
  private:
+  static VertexDisplacement by() { return {.1, .25f, true}; }
+  PointMoves moves() const
+  {
+    return {this,
+            [](const void* owner, std::uint32_t triangle, const float(*b)[8], Vec3f* moves) {
+              for (int k = 0; k < 8; ++k)
+                moves[k] = to_float(static_cast<const MovedTorus*>(owner)->move(triangle, b, k));
+            },
+            nullptr};
+  }
+  HeightSource heights() const
+  {
+    return {this, [](const void* owner, std::uint32_t triangle, const float(*b)[8], float* h) {
+              for (int k = 0; k < 8; ++k)
+                h[k] = static_cast<float>(static_cast<const MovedTorus*>(owner)->move(triangle, b, k).x);
+            }};
+  }
+  Vec3d move(std::uint32_t triangle, const float (*b)[8], int k) const
+  {
+    const TriangleIndices& t = triangles_[triangle];
+    const Vec3d P = static_cast<double>(b[0][k]) * to_double(P_[t.v0]) +
+                    static_cast<double>(b[1][k]) * to_double(P_[t.v1]) +
+                    static_cast<double>(b[2][k]) * to_double(P_[t.v2]);
+    return move_(P, triangle, static_cast<double>(b[1][k]));
+  }
+
   Move move_;
-  bool has_line_;
+  bool along_, has_line_;
   std::vector<Vec3f> P_;
   std::vector<Normal3f> N_;
   std::vector<TriangleIndices> triangles_;
@@ -217,6 +243,7 @@ struct Case {
   const char* name;
   Move move;
   CellsAlong cells;
+  bool along = false;    ///< heights move points
   bool is_flat = false;  ///< sums of normals are what rounding leaves of them
 };
 
@@ -235,13 +262,20 @@ std::vector<Case> cases()
            [](Vec3d P, std::uint32_t, double) {
              return Vec3d{0, -P.y, 0};
            },
+           uneven, false, true},
+          {"heights on uneven lattices", waves, uneven, true},
+          // As those of a graph over texture coordinates may, where these are cut.
+          {"heights of each triangle's own",
+           [](Vec3d P, std::uint32_t triangle, double b) {
+             return waves(P, 0, 0) + Vec3d{.005 * triangle + .1 * b, 0, 0};
+           },
            uneven, true}};
 }
 
 TEST(PointTiles, HaveThePointsOfADividedMesh)
 {
   for (const Case& c : cases()) {
-    const MovedTorus torus(c.move, c.cells);
+    const MovedTorus torus(c.move, c.along, c.cells);
     PointTileCache cache(1 << 24);
     const auto tiled = torus.tiled(cache);
     std::size_t num_points = 0;
@@ -266,7 +300,7 @@ TEST(PointTiles, AreShadedAsADividedMesh)
   const float weights[][2] = {{.3f, .3f}, {.01f, .01f}, {.98f, .01f}, {.01f, .98f}};
   for (const Case& c : cases()) {
     // The divided mesh has normals of what rounding leaves of a line's triangles.
-    const MovedTorus torus(c.move, c.cells, false);
+    const MovedTorus torus(c.move, c.along, c.cells, {.has_line = false});
     PointTileCache cache(1 << 24);
     const auto tiled = torus.tiled(cache);
     const MeshView& whole = torus.whole();
@@ -330,7 +364,7 @@ TEST(PointTiles, AreMetWhereTheirTrianglesAre)
 {
   const std::uint64_t num_rays = num_test_rays(1500);
   for (const Case& c : cases()) {
-    const MovedTorus torus(c.move, c.cells);
+    const MovedTorus torus(c.move, c.along, c.cells);
     PointTileCache cache(1 << 24);
     const auto tiled = torus.tiled(cache);
     std::vector<std::unique_ptr<Tree>> trees;
@@ -382,15 +416,13 @@ TEST(PointTiles, AreMetWhereTheirTrianglesAre)
 }
 
 /// Half of the rays to points and sides, where Embree's triangles let some through.
-TEST(PointTiles, LetNoRayOut)
+void expect_no_ray_out(const MovedTorus& torus, std::uint64_t num_rays)
 {
-  const MovedTorus torus(curl, uneven);
   PointTileCache cache(1 << 24);
   const auto tiled = torus.tiled(cache);
   std::vector<std::unique_ptr<Tree>> trees;
   for (const TraversalTable* table : tables()) trees.push_back(std::make_unique<Tree>(*tiled, *table));
   std::mt19937_64 random(5 + test_part());
-  const std::uint64_t num_rays = num_test_rays(1000000);
   for (std::uint64_t k = 0; k < num_rays; ++k) {
     const Vec3d O = to_double(to_float(MovedTorus::inside(random)));
     Vec3d D = direction(random);
@@ -408,6 +440,50 @@ TEST(PointTiles, LetNoRayOut)
   }
 }
 
+TEST(PointTiles, LetNoRayOut)
+{
+  const std::uint64_t num_rays = num_test_rays(1000000);
+  expect_no_ray_out(MovedTorus(curl, false, uneven), num_rays / 2);
+  // Where normals differ heights move borders apart.
+  expect_no_ray_out(MovedTorus(waves, true, uneven, {.has_cut = false}), num_rays / 2);
+}
+
+/// Points of one place go their own ways where its normals differ, and together where these are the same: as in the divided mesh, the
+/// border opens or stays closed.
+TEST(PointTiles, OpenABorderWhereItsNormalsDiffer)
+{
+  const Vec3f P[] = {{0, -1, 0}, {0, 1, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {1, 0, 0}};
+  const TriangleIndices triangles[] = {{0, 1, 2}, {3, 4, 5}};
+  const HeightSource heights{nullptr,
+                             [](const void*, std::uint32_t, const float(*)[8], float* h) { std::fill_n(h, 8, 1.0f); }};
+  for (const bool same : {false, true}) {
+    const float lean = same ? 0 : 1;
+    const Normal3f N[] = {{-lean, 0, 1}, {-lean, 0, 1}, {-lean, 0, 1}, {lean, 0, 1}, {lean, 0, 1}, {lean, 0, 1}};
+    MeshView mesh;
+    mesh.P = P;
+    mesh.N = N;
+    mesh.triangles = triangles;
+    mesh.num_vertices = 6;
+    mesh.num_triangles = 2;
+    const std::vector<LatticeTriangle> parts = lattices_make(mesh, 32);
+    const VertexDisplacement by{.1, 0, true};
+    PointTileCache cache(1 << 24);
+    const PointTiles tiles(mesh, point_mover_make(heights, by), parts, true, cache, 0);
+    const MovedMesh whole = divided_mesh_make(mesh, heights, parts, by);
+    float least = kInfinity;  // of the whole mesh, from the border
+    for (const Vec3f& at : whole.P) least = std::min(least, std::abs(at.x));
+    EXPECT_NEAR(least, same ? 0 : .1 / std::sqrt(2.0), 1e-6);
+    const Tree tree(tiles);
+    std::mt19937_64 random(9);
+    for (int k = 0; k < 10000; ++k) {
+      const Vec3d O{between(random, -.2, .2), between(random, -.7, .7), 3};
+      const double inside = std::abs(O.x) - static_cast<double>(least);
+      if (!same && std::abs(inside) < 1e-5) continue;
+      ASSERT_EQ(is_hit(tree.intersect(O, {0, 0, -1})), same || inside > 0) << O.x << ' ' << O.y;
+    }
+  }
+}
+
 /// Rays that leave a point start as far from it as floats err there, which is nothing at 0.
 TEST(PointTiles, LevelGroundAtZeroIsLeft)
 {
@@ -422,7 +498,7 @@ TEST(PointTiles, LevelGroundAtZeroIsLeft)
       nullptr, [](const void*, std::uint32_t, const float(*)[8], Vec3f* out) { std::fill_n(out, 8, Vec3f{}); },
       nullptr};
   PointTileCache cache(1 << 24);
-  const PointTiles tiles(mesh, moves, lattices_make(mesh, 64), false, cache, 0);
+  const PointTiles tiles(mesh, point_mover_make(moves), lattices_make(mesh, 64), false, cache, 0);
   for (const TraversalTable* table : tables()) {
     const Tree tree(tiles, *table);
     std::mt19937_64 random(9);
@@ -440,7 +516,7 @@ TEST(PointTiles, LevelGroundAtZeroIsLeft)
 
 TEST(PointTiles, AreTheSameForEveryCacheAndNumberOfThreads)
 {
-  const MovedTorus torus(curl, uneven);
+  const MovedTorus torus(curl, false, uneven);
   struct Answer {
     std::uint32_t primitive;
     float u, v, t, number;

@@ -136,6 +136,41 @@ TEST(MovedVertices, AreNoneWhereAMethodIsNamedOrRoomIsShort)
   EXPECT_LT(farthest_from(short_of_room, [](double x) { return kScale * std::sin(kWaves * x); }), 2e-4);
 }
 
+/// Where the divided triangles have no room but tiles of them do, rays meet the same surface in these, in all pictures of a sequence.
+TEST(MovedVertices, AreThoseOfTilesWhereRoomIsShort)
+{
+  const Scene scene = square(1, kWaves);
+  const DisplacementOptions options = options_of(scene, 720);
+  const SceneContext whole(scene, options);
+  EXPECT_GT(num_moved_triangles(whole), 2u * 150 * 150);
+  DisplacementOptions short_of_room = options;
+  short_of_room.dicing_bytes = 400'000;
+  short_of_room.choices = std::make_shared<DicingChoices>();
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<float> unit(-0.9f, 0.9f);
+  std::vector<TraceRay> rays;
+  for (int k = 0; k < 2000; ++k)
+    rays.push_back({{unit(random), unit(random), 3}, {0.3f * unit(random), 0.3f * unit(random), -1}});
+  const std::vector<TraceHit> expected = trace_rays(whole, rays);
+  for (int picture = 0; picture < 2; ++picture) {
+    const SceneContext in_tiles(scene, short_of_room);
+    EXPECT_EQ(in_tiles.displacements.method_names(), "tiles");
+    EXPECT_TRUE(in_tiles.displacements.warnings().empty());
+    const std::vector<TraceHit> hits = trace_rays(in_tiles, rays);
+    for (std::size_t k = 0; k < rays.size(); ++k) {
+      ASSERT_EQ(hits[k].hit, expected[k].hit) << k;
+      if (!hits[k].hit) continue;
+      ASSERT_LT(length(hits[k].P - expected[k].P), 1e-5f) << k;
+      ASSERT_GT(dot(hits[k].Ng, expected[k].Ng), 1 - 1e-4f) << k;
+      ASSERT_LE(hits[k].triangle_index, 1u) << k;
+    }
+    EXPECT_GT(in_tiles.displacements.tiles().made, 10u);
+  }
+  // With room for the mesh, the pictures after have it.
+  short_of_room.dicing_bytes = std::uint64_t{1} << 30;
+  EXPECT_EQ(SceneContext(scene, short_of_room).displacements.method_names(), "vertices");
+}
+
 /// One height everywhere, by a graph that reads nothing, as a map or at points: a moved mesh, however coarse it is.
 TEST(MovedVertices, AreThoseOfTheMeshWhereHeightsAreTheSame)
 {
