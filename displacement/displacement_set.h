@@ -221,16 +221,15 @@ class DisplacementSet {
   std::unique_ptr<PreparedMesh> make_computed(const Use& use, const DisplacementOptions& options);
   std::unique_ptr<PreparedMesh> make_tiled(const Use& use, std::vector<LatticeTriangle> parts);
   /// Whose vertices a use is to move: the mesh's where heights are the same everywhere or triangles a few cells wide, those of
-  /// divided ones where they have room.
-  /// @param parts       receives those of divided triangles
+  /// divided ones where they have room. Where they have none, rays are traced over tiles of them; where these have none either, over
+  /// the heights.
+  /// @param parts       receives those of divided triangles, and of tiles
   /// @param used_bytes  by all meshes so far; grows by what dividing takes
   VertexMove vertex_move_of(const Use& use,
                             const DisplacementOptions& options,
                             std::vector<LatticeTriangle>* parts,
                             std::uint64_t* used_bytes);
-  /// The same for vectors: where divided triangles have no room, rays are traced over tiles of them. Where even these have none, or
-  /// the mesh deforms, triangles are larger.
-  /// @param parts  receives those of tiles as well
+  /// The same for vectors: where even tiles have no room, or the mesh deforms, triangles are larger.
   VertexMove vector_move_of(const Use& use,
                             const DisplacementOptions& options,
                             std::vector<LatticeTriangle>* parts,
@@ -282,7 +281,7 @@ class DisplacementSet {
   std::vector<MeshView> meshes_;
   std::shared_ptr<const void> heights_owner_;
   std::unique_ptr<LatticeCache> lattice_cache_;  ///< of computed heights; null: there are none
-  std::unique_ptr<PointTileCache> tile_cache_;   ///< of points that vectors move, likewise
+  std::unique_ptr<PointTileCache> tile_cache_;   ///< of points that move, likewise
   std::uint64_t num_tiles_ = 0;                  ///< of all geometries
   std::vector<int> geometry_of_instance_, moved_of_instance_;
   std::vector<float> texel_of_instance_;

@@ -40,7 +40,7 @@ struct DisplacedGeometry {
   RmipOptions rmip_options;                     ///< for both of RMIP's
   RTCFilterFunctionN shadow_filter = nullptr;   ///< called for hits of shadow rays; null: all of them are opaque
   const ProceduralField* procedural = nullptr;  ///< heights in place of a map's; there are no levels then
-  const PointTiles* tiles = nullptr;            ///< in place of all above but the filter: points that vectors move
+  const PointTiles* tiles = nullptr;            ///< in place of all above but the filter: points that move
   RTCScene scene =
       nullptr;  ///< of this geometry, or of what it is tessellated to, committed; null: no neighbours are known
 };
@@ -138,6 +138,7 @@ struct DisplacedPoint {
   Vec3f P = {}, Ng = {};       ///< on the traced surface, object space; Ng unit, on the side of the displacement normal
   Vec3f Ns = {};               ///< unit shading normal, object space: Ng, or that of the smoothed map
   Vec3f leave = {};            ///< see SurfaceHit::leave; object space
+  Vec3f lift = {};  ///< see SurfaceHit::P_lift, world; 0: the surface is traced as it is, there is no smoother one
   float level = 0;             ///< of the map; above 0 it stands for facets of finer texels, see level_facets.h
 };
 

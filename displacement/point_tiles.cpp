@@ -12,6 +12,7 @@
 #include "displacement/far_ray.h"
 #include "displacement/plane_clearance.h"
 #include "displacement/shared_edges.h"
+#include "kernel/shape/surface_hit.h"
 
 namespace relief {
 
@@ -455,12 +456,20 @@ DisplacedPoint PointTiles::resolve(const InstanceView& placement, std::uint32_t 
   out.P = to_float(at);
   out.Ng = out.Ns = to_float(Ng);
   if (smooth_) {
-    Vec3d Ns{};
-    for (int k = 0; k < 3; ++k)
-      Ns = Ns + micro.weight[k] * smooth_normal(points, micro.part, micro.at[k][0], micro.at[k][1]);
-    // As on plain meshes.
+    Vec3d N[3], Ns{};
+    for (int k = 0; k < 3; ++k) {
+      N[k] = smooth_normal(points, micro.part, micro.at[k][0], micro.at[k][1]);
+      Ns = Ns + micro.weight[k] * N[k];
+    }
+    // As on plain meshes, like what follows.
     constexpr double kCancelled = 1e-6;
     if (length(Ns) > kCancelled) out.Ns = to_float(Ns * (1 / length(Ns)));
+    const auto edge = [&](int k) { return transform_vector(placement.world_from_object, to_float(P[k] - P[0])); };
+    const auto N_world = [&](int k) {
+      return normalize(transform_normal(placement.object_from_world, as_normal(to_float(N[k]))));
+    };
+    const auto weight = [&](int k) { return static_cast<float>(micro.weight[k]); };
+    out.lift = triangle_lift(weight(0), weight(1), weight(2), edge(1), edge(2), N_world(0), N_world(1), N_world(2));
   }
   // Rays that leave from beside a side of the triangle start clear of those around it, as Tessellation::leave has it.
   const LeavingErrors errors = leaving_errors(placement, out.P, out.Ng);

@@ -33,7 +33,7 @@ struct PreparedMesh {
   LevelBlend blend;                ///< of its mesh, if it has one
   std::unique_ptr<Dicing> dicing;  ///< what is tessellated in place of the mesh; null: the mesh itself
   std::unique_ptr<Tessellation> tessellation;
-  std::unique_ptr<PointTiles> tiles;   ///< where vectors move points; nothing of the above is made then
+  std::unique_ptr<PointTiles> tiles;  ///< where points move and the mesh has no room; nothing of the above is made then
   WallsBeside walls;                   ///< at its borders with other meshes
   std::optional<ContentHash> content;  ///< of all that `mesh` and `tree` are made of; empty: they are not to be kept
   std::shared_ptr<RTCSceneTy> tree;    ///< of `geometry`, committed; null: none yet

@@ -29,6 +29,7 @@ void path_resolve_hit(const KernelGlobals& g, const Accel& accel, PathState& sta
     state.hit_Ng[path] = point.Ng;
     state.hit_Ns[path] = point.Ns;
     state.hit_leave[path] = point.leave;
+    state.hit_lift[path] = point.lift;
     state.hit_width[path] = point.width < kInfinity ? point.width / PathLod(state, path).factor : kInfinity;
     if (state.facets != nullptr) path_enter_facets(accel.displacements(), state, path, instance, point.level);
   }

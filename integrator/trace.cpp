@@ -70,7 +70,7 @@ TraceHit trace_ray(const SceneContext& context, const TraceRay& ray, PrismVisits
     const MeshView mesh =
         context.motion.mesh_at(instance, context.meshes[static_cast<std::size_t>(instance.mesh_index)], kTraceTime);
     const SurfaceHit surface = displaced ? surface_hit_displaced(mesh, instance, point.triangle, point.u, point.v,
-                                                                 {point.P, point.Ng, point.Ns, point.leave})
+                                                                 {point.P, point.Ng, point.Ns, point.leave, point.lift})
                                          : surface_hit_of_ray(mesh, instance, query);
     result.hit = true;
     result.t = scaled(query.ray.tfar, -1);

@@ -17,7 +17,7 @@ struct SurfaceHit {
   Vec2f uv[2];    ///< texture coordinates; (0, 0) where absent
   Vec4f color{1, 1, 1, 1};
   float area_ratio[2] = {0, 0};  ///< √(uv area / world area) of the triangle: uv units a metre, for texture footprints
-  Vec3f P_lift;   ///< vector from P to the smooth surface that Ns suggests, see surface_hit_make; 0 for flat meshes
+  Vec3f P_lift;   ///< vector from P to the smooth surface that Ns suggests, see triangle_lift; 0 for flat meshes
   Vec3f leave{};  ///< how rays' origins are moved to the front side, metres; 0: along Ng, by P_error
   Vec3f clear{};  ///< how they are moved first, along the triangle: see triangle_clearance
 };
@@ -82,9 +82,25 @@ RELIEF_KERNEL void surface_hit_density(const MeshView& mesh, TriangleIndices tri
   }
 }
 
+/// Vector from a point of a triangle to a smooth surface through its vertices. It is projected onto the plane of each vertex and its
+/// normal; the surface is the barycentric mean of the projections. Only the outward part is used: on concave patches the point itself
+/// is already outside.
+/// @param w, u, v       barycentric weights of the vertices
+/// @param edge1, edge2  from vertex 0 to vertices 1 and 2
+/// @param n0, n1, n2    unit
+/// @source Hanika 2021, "Hacking the Shadow Terminator"
+RELIEF_KERNEL Vec3f triangle_lift(float w, float u, float v, Vec3f edge1, Vec3f edge2, Vec3f n0, Vec3f n1, Vec3f n2)
+{
+  const Vec3f to0 = -(u * edge1 + v * edge2);
+  const float d0 = max(0.0f, dot(to0, n0));
+  const float d1 = max(0.0f, dot(to0 + edge1, n1));
+  const float d2 = max(0.0f, dot(to0 + edge2, n2));
+  return w * d0 * n0 + u * d1 * n1 + v * d2 * n2;
+}
+
 /// Evaluates the triangle's attributes at a hit.
 /// @param bary_u, bary_v  barycentric weights of vertices 1 and 2
-/// @source position error: pbrt-v4 §6.8.5 and Eq. 6.24; lift: Hanika 2021, "Hacking the Shadow Terminator"
+/// @source position error: pbrt-v4 §6.8.5 and Eq. 6.24
 RELIEF_KERNEL SurfaceHit surface_hit_make(const MeshView& mesh,
                                           const InstanceView& instance,
                                           std::uint32_t triangle_index,
@@ -132,13 +148,7 @@ RELIEF_KERNEL SurfaceHit surface_hit_make(const MeshView& mesh,
     const float n_length = length(n);
     // Opposite vertex normals can cancel; then the flat normal is the only defensible one.
     if (n_length > 1e-6f) hit.Ns = n / n_length;
-    // Project P onto the plane of each vertex and its normal; the barycentric mean of the projections is a smooth
-    // surface through the vertices. Only the outward part is used: on concave patches P itself is already outside.
-    const Vec3f to0 = -(bary_u * edge1 + bary_v * edge2);
-    const float d0 = max(0.0f, dot(to0, n0));
-    const float d1 = max(0.0f, dot(to0 + edge1, n1));
-    const float d2 = max(0.0f, dot(to0 + edge2, n2));
-    hit.P_lift = w0 * d0 * n0 + bary_u * d1 * n1 + bary_v * d2 * n2;
+    hit.P_lift = triangle_lift(w0, bary_u, bary_v, edge1, edge2, n0, n1, n2);
   }
 
   surface_hit_interpolate(mesh, tri, bary_u, bary_v, &hit);
@@ -181,16 +191,16 @@ RELIEF_KERNEL Vec3f displaced_tracer_error(const MeshView& mesh, const InstanceV
   return (abs(m.x) + abs(m.y) + abs(m.z)) * error;
 }
 
-/// A point of the displaced surface, as its tracer has it, object space.
+/// A point of the displaced surface, as its tracer has it, object space where nothing else is said.
 struct DisplacedSurface {
   Vec3f P;      ///< rounded once
   Vec3f Ng;     ///< unit geometric normal, on the side of the displacement normal
   Vec3f Ns;     ///< unit shading normal, likewise
   Vec3f leave;  ///< see SurfaceHit::leave
+  Vec3f lift{};  ///< see SurfaceHit::P_lift; world space
 };
 
 /// As surface_hit_make, on the displaced surface over the triangle. Texture coordinates and colours are the triangle's.
-/// Displaced surfaces are traced as they are, so there is no smoother one to lift shadow rays to.
 RELIEF_KERNEL SurfaceHit surface_hit_displaced(const MeshView& mesh,
                                                const InstanceView& instance,
                                                std::uint32_t triangle_index,
@@ -206,7 +216,7 @@ RELIEF_KERNEL SurfaceHit surface_hit_displaced(const MeshView& mesh,
   hit.P_error = displaced_point_error(instance, at.P, hit.P).world + displaced_tracer_error(mesh, instance, tri);
   hit.Ng = normalize(transform_normal(inverse, as_normal(at.Ng)));
   hit.Ns = normalize(transform_normal(inverse, as_normal(at.Ns)));
-  hit.P_lift = {};
+  hit.P_lift = at.lift;
   hit.leave = transform_vector(m, at.leave);
   surface_hit_interpolate(mesh, tri, bary_u, bary_v, &hit);
   const Vec3f p0 = mesh.P[tri.v0];

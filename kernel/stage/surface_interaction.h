@@ -151,8 +151,9 @@ surface_interaction_locate(const KernelGlobals& g, const PathState& state, std::
     const Vec3f P_ray = path_origin(state, path) + path_direction(state, path) * state.hit_t[path];
     at.hit = primitive_hit(place, *at.instance, P_ray, wo);
   } else {
-    at.hit = surface_hit_displaced(*place.mesh, *at.instance, place.primitive, place.u, place.v,
-                                   {state.hit_P[path], state.hit_Ng[path], state.hit_Ns[path], state.hit_leave[path]});
+    at.hit = surface_hit_displaced(
+        *place.mesh, *at.instance, place.primitive, place.u, place.v,
+        {state.hit_P[path], state.hit_Ng[path], state.hit_Ns[path], state.hit_leave[path], state.hit_lift[path]});
   }
   surface_interaction_see<kFeatures>(state, path, wo, at);
   return at;

@@ -18,6 +18,7 @@
 #include "displacement/lattice_split.h"
 #include "displacement/moved_mesh.h"
 #include "displacement/point_tiles.h"
+#include "kernel/shape/surface_hit.h"
 #include "tests/oracle/triangle_tree.h"
 #include "tests/support/test_rays.h"
 
@@ -298,6 +299,9 @@ TEST(PointTiles, HaveThePointsOfADividedMesh)
 TEST(PointTiles, AreShadedAsADividedMesh)
 {
   const float weights[][2] = {{.3f, .3f}, {.01f, .01f}, {.98f, .01f}, {.01f, .98f}};
+  InstanceView placed;
+  placed.world_from_object = {{1, 0, 0}, {0, 2, 0}, {0, 0, .5f}, {.1f, .2f, .3f}};
+  placed.object_from_world = {{1, 0, 0}, {0, .5f, 0}, {0, 0, 2}, {-.1f, -.1f, -.6f}};
   for (const Case& c : cases()) {
     // The divided mesh has normals of what rounding leaves of a line's triangles.
     const MovedTorus torus(c.move, c.along, c.cells, {.has_line = false});
@@ -306,6 +310,7 @@ TEST(PointTiles, AreShadedAsADividedMesh)
     const MeshView& whole = torus.whole();
     std::uint32_t tile = 0;
     std::size_t num_seen = 0;
+    float most_lift = 0;
     for (std::uint32_t part = 0; part < torus.parts().size(); ++part) {
       const LatticeTriangle& lattice = torus.parts()[part];
       for (std::int32_t j0 = 0; j0 < lattice.n; j0 += PointTile::kCells) {
@@ -321,8 +326,7 @@ TEST(PointTiles, AreShadedAsADividedMesh)
             const Vec3d normal = cross(P[1] - P[0], P[2] - P[0]);
             if (!(length(normal) > 1e-12)) continue;
             for (const auto& w : weights) {
-              const InstanceView here;
-              const DisplacedPoint at = tiled->resolve(here, tile, {w[0], w[1], static_cast<float>(number)});
+              const DisplacedPoint at = tiled->resolve(placed, tile, {w[0], w[1], static_cast<float>(number)});
               const double b[3] = {1 - static_cast<double>(w[0]) - static_cast<double>(w[1]), w[0], w[1]};
               Vec3d there{}, smooth{};
               for (int k = 0; k < 3; ++k) {
@@ -332,6 +336,12 @@ TEST(PointTiles, AreShadedAsADividedMesh)
               ASSERT_LT(length(to_double(at.P) - there), 1e-6) << c.name;
               ASSERT_GT(dot(to_double(at.Ng), normal), (1 - 1e-6) * length(normal)) << c.name;
               if (!c.is_flat && length(smooth) > .01) {
+                MeshView there_alone = whole;
+                const TriangleIndices triangle{v[0], v[1], v[2]};
+                there_alone.triangles = &triangle;
+                const SurfaceHit hit = surface_hit_make(there_alone, placed, 0, w[0], w[1]);
+                ASSERT_LT(length(at.lift - hit.P_lift), 1e-6f + 1e-4f * length(hit.P_lift)) << c.name;
+                most_lift = std::max(most_lift, length(hit.P_lift));
                 ASSERT_GT(dot(to_double(at.Ns), smooth), (1 - 1e-5) * length(smooth))
                     << c.name << " part " << part << " n " << lattice.n << " cell " << i << ' ' << j << ' ' << second;
               }
@@ -344,6 +354,7 @@ TEST(PointTiles, AreShadedAsADividedMesh)
     }
     EXPECT_EQ(tile, tiled->num_tiles());
     EXPECT_GT(num_seen, 100u) << c.name;
+    EXPECT_TRUE(c.is_flat || most_lift > 1e-3f) << c.name;
   }
 }
 
