@@ -13,8 +13,8 @@ struct VolumeNumbers {
   const GraphLane& at;
   int place;  ///< among the program's results
 
-  float number() { return closure_input(graph_result(at, place++)); }
-  Vec3f color()
+  [[gnu::always_inline]] float number() { return closure_input(graph_result(at, place++)); }
+  [[gnu::always_inline]] Vec3f color()
   {
     const float r = number(), g = number();
     return Vec3f{r, g, number()};
