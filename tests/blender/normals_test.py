@@ -88,6 +88,20 @@ def _waves():
     return new_image(pixels)
 
 
+def test_flat_faces_that_are_not_planar():
+    """Cycles shades their triangles each by itself; the add-on gave both of a quadrilateral the normal of the face."""
+    scene = _scene(0)
+    glossy = new_material("glossy", "ShaderNodeBsdfGlossy", Roughness=0.4)[0]
+    plane = add_plane(4.0, glossy, subdivisions=6)
+    numbers = np.random.default_rng(1)
+    for vertex in plane.data.vertices:
+        vertex.co.z = 0.2 * numbers.random()
+    plane.data.update()
+    add_light("SUN", rotation=degrees(20, 10, 0), energy=3.0)
+    add_camera((0, 0, 6))
+    assert_agrees(scene)
+
+
 def _mapped(kind, **inputs):
     material, tree, node = new_material("mapped", kind, **inputs)
     texture = add_image_node(tree, _waves())

@@ -142,6 +142,19 @@ class _Corners:
         """Normals without the edges of flat faces, which displacement would tear open; marked edges stay: as `at` takes them."""
         return self._once(self._read_displacement_normals)
 
+    def warped(self, triangles):
+        """Which triangles are shaded by themselves: those of flat faces that are not planar. Cycles knows no normal of a face.
+
+        @param  triangles  loop numbers (n, 3)
+        @return            bool (n,)
+        """
+        flat = self._once(self._read_flat)
+        if flat is None:
+            return np.zeros(len(triangles), dtype=bool)
+        normals = triangle_normals(self.positions[self.vertex[triangles]])
+        cosines = np.einsum("ij,ij->i", normals, self.normals()[triangles[:, 0]])
+        return flat[triangles[:, 0]] & (cosines < 1 - 5e-7) & normals.any(axis=1)
+
     def coordinates(self, source):
         """Texture coordinates in glTF's orientation, v = 0 at the top: float32 (loops, 2); None if there are none."""
         return self._once(self._read_coordinates, source)
@@ -162,6 +175,17 @@ class _Corners:
         if compat.has_vertex_normals(self.mesh):
             return self._once(self._read_vertex_normals)
         return _zero_where_not_finite(compat.corner_normals(self.mesh))
+
+    def _read_flat(self):
+        """Whether corners are of flat faces with more than three: bool (loops,); None: none is."""
+        polygons = self.mesh.polygons
+        if compat.has_vertex_normals(self.mesh) or self.mesh.has_custom_normals:
+            return None
+        smooth, corners = np.empty(len(polygons), dtype=bool), np.empty(len(polygons), dtype=np.int32)
+        polygons.foreach_get("use_smooth", smooth)
+        polygons.foreach_get("loop_total", corners)
+        flat = ~smooth & (corners > 3)
+        return np.repeat(flat, corners) if flat.any() else None
 
     def _read_displacement_normals(self):
         return self.normals() if compat.splits_normals(self.mesh) else self._once(self._read_vertex_normals)
@@ -441,6 +465,16 @@ def add_mesh(stored, materials, writer, dicing=None, curve_shape="ribbons"):
     return writer.add_unique("meshes", {"name": stored.name, "primitives": primitives})
 
 
+def triangle_normals(points):
+    """Unit normals of triangles, 0 of those without area.
+
+    @param  points  (n, 3 corners, 3)
+    """
+    normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)
+
+
 def _target(name, number):
     """Name of an array of a morph target."""
     return f"{name} {number}"
@@ -476,12 +510,23 @@ def _primitive_arrays(corners, triangles, joiner, wanted, shapes, warn):
             per_loop[attributes.file_name(source)] = values
     may_differ = [values for values in per_loop.values() if not isinstance(values, _OfVertices)]
     representatives, indices = joiner.join(triangles.ravel(), may_differ)
+    warped = np.zeros(0, dtype=bool) if wanted.displaced else corners.warped(triangles)
+    own = slice(len(representatives), None)  # corners that no other triangle has
+    if warped.any():
+        indices = indices.reshape(-1, 3)
+        indices[warped] = own.start + np.arange(3 * np.count_nonzero(warped)).reshape(-1, 3)
+        indices = indices.ravel()
+        representatives = np.concatenate((representatives, triangles[warped].ravel()))
     arrays = {"POSITION": np.ascontiguousarray(corners.positions[corners.vertex[representatives]])}
     for name, values in per_loop.items():
         arrays[name] = np.ascontiguousarray(corners.at(values, representatives))
+    if warped.any():
+        arrays["NORMAL"][own] = np.repeat(triangle_normals(arrays["POSITION"][own].reshape(-1, 3, 3)), 3, axis=0)
     for number, shape in enumerate(shapes):
         normals = shape.displacement_normals if wanted.displaced else shape.normals
         moved = {"POSITION": shape.positions[corners.vertex[representatives]], "NORMAL": normals[representatives]}
+        if warped.any():
+            moved["NORMAL"][own] = np.repeat(triangle_normals(moved["POSITION"][own].reshape(-1, 3, 3)), 3, axis=0)
         for name, values in moved.items():
             arrays[_target(name, number)] = np.ascontiguousarray(values - arrays[name])
     arrays["indices"] = indices
