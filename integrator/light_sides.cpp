@@ -5,7 +5,11 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <optional>
+#include <span>
+#include <vector>
 
+#include "integrator/instance_hit.h"
 #include "integrator/light_tree_build.h"
 #include "integrator/scene_context.h"
 #include "kernel/sample/sobol.h"
@@ -91,19 +95,9 @@ Met ray_meets(const SceneContext& context,
   constexpr float kOff = 1e-3f, kRounding = 4e-6f;
   const Vec3f O = P + N * (kOff * size + kRounding * max_component(abs(P)));
   const Vec3f D = from_local(frame_from_normal(N), warp_cosine_hemisphere(number(2)));
-  EmbreeContext embree;
-  embree_context_init(embree, false);
-  RTCRayHit ray{};
-  ray.ray.org_x = O.x, ray.ray.org_y = O.y, ray.ray.org_z = O.z;
-  ray.ray.dir_x = D.x, ray.ray.dir_y = D.y, ray.ray.dir_z = D.z;
-  ray.ray.tfar = kInfinity;
-  ray.ray.time = 0.5f;
-  ray.ray.mask = kRayShadow;
-  ray.hit.geomID = ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  context.accel->intersect(embree, ray);
-  if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return Met::kNothing;
-  const unsigned met = ray.hit.instID[0] != RTC_INVALID_GEOMETRY_ID ? ray.hit.instID[0] : ray.hit.geomID;
-  return met == instance ? Met::kItself : Met::kOther;
+  const std::optional<InstanceHit> met = instance_hit_next(context, O, D, 0.5f, 0.0f, kInfinity, kRayShadow);
+  if (!met) return Met::kNothing;
+  return met->instance == instance ? Met::kItself : Met::kOther;
 }
 
 /// Of the rays that leave a side.
