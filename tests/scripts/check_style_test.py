@@ -36,6 +36,12 @@ class CheckStyle(unittest.TestCase):
         self.assertEqual(code, 1, output)
         self.assertIn(message, output)
 
+    def test_tests_that_are_not_built(self):
+        self.assert_wrong({"tests/a_test.cpp": GOOD, "tests/CMakeLists.txt": "x(SOURCES b_a_test.cpp)\n"}, "tests/a_test.cpp:1: test that is not built")
+        self.assert_wrong({"tests/a_test.cpp": GOOD}, "tests/a_test.cpp:1: test that is not built")
+        code, output = self.run_on({}, {"tests/a_test.cpp": GOOD, "tests/CMakeLists.txt": "x(SOURCES a_test.cpp)\n"})
+        self.assertEqual(code, 0, output)
+
     def test_a_tree_without_faults(self):
         text = ("struct Named {\n  int member = 0;\n};\nconstexpr int kMost = 3;\nstruct stat;\n#define X(name) int name;\n"
                 "X(a)\n#undef X\n")
