@@ -14,12 +14,13 @@ namespace relief {
 /// A box that rays are traced in, and the larger one around it from which they need not be moved.
 struct RayTarget {
   Box3 box = box_empty();
-  Box3 near_box = box_empty();  ///< as much larger on all sides as the box is long
+  Box3 near_box = box_empty();  ///< larger on all sides by as many lengths of the box as are near
 };
 
-RELIEF_KERNEL RayTarget ray_target_make(const Box3& box)
+/// @param lengths  that are near
+RELIEF_KERNEL RayTarget ray_target_make(const Box3& box, float lengths = 1.0f)
 {
-  const float reach = length(box.high - box.low);
+  const float reach = lengths * length(box.high - box.low);
   return {box, {box.low - splat3(reach), box.high + splat3(reach)}};
 }
 

@@ -4,12 +4,12 @@
 
 namespace relief {
 
-EnvironmentIrradiance environment_irradiance(const EnvironmentTables& tables)
+EnvironmentIrradiance environment_irradiance(const EnvironmentTables& tables, Vec3f channels)
 {
   const EnvironmentView environment = tables.view();
   EnvironmentIrradiance irradiance;
   if (!environment.has_map) {
-    irradiance.mean = irradiance.constant = kPi * light_scalar(environment.color);
+    irradiance.mean = irradiance.constant = kPi * light_scalar(environment.color, channels);
     return irradiance;
   }
   // Moments ∫ L, ∫ L ω, ∫ L ω ωᵀ.
@@ -19,7 +19,7 @@ EnvironmentIrradiance environment_irradiance(const EnvironmentTables& tables)
     const EnvironmentSample sample = environment_sample(environment, sample_2d(0, 2 * i, 0));
     const float bright = luminance(abs(sample.radiance));
     if (!(sample.pdf_solid_angle > 0.0f) || !(bright > tables.base_luminance)) continue;
-    const float sampled = light_scalar(sample.radiance) * (1.0f - tables.base_luminance / bright);
+    const float sampled = light_scalar(sample.radiance, channels) * (1.0f - tables.base_luminance / bright);
     const double L = static_cast<double>(sampled) / static_cast<double>(sample.pdf_solid_angle) / kSamples;
     const double w[3] = {static_cast<double>(sample.wi.x), static_cast<double>(sample.wi.y),
                          static_cast<double>(sample.wi.z)};
@@ -54,13 +54,16 @@ void environment_integrate(LightSet& set)
   constexpr std::uint32_t kSamples = 4096;
   double sum = 0;
   double squares = 0;
+  Vec3f color;
   for (std::uint32_t i = 0; i < kSamples; ++i) {
     const EnvironmentSample sample = environment_sample_all(environment, sample_2d(0, 2 * i, 0));
     const double radiance = static_cast<double>(light_scalar(sample.radiance));
     sum += radiance / static_cast<double>(sample.pdf_solid_angle) / kSamples;
+    color += abs(sample.radiance) / (sample.pdf_solid_angle * (4 * kPi * kSamples));
     squares += radiance * radiance / static_cast<double>(sample.pdf_solid_angle) / kSamples;
   }
   set.environment_flux_density = std::min(sum / 4, 1e30);
+  set.environment_color = is_finite(color) ? color : Vec3f{};
   set.environment_solid_angle = squares > 0 ? sum * sum / squares : 0.0;
 }
 

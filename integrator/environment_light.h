@@ -8,9 +8,10 @@ namespace relief {
 
 /// Irradiance of what the tables sample, by their own importance sampling: exact up to the variation within cells, so a
 /// small sun in the map is not missed.
-EnvironmentIrradiance environment_irradiance(const EnvironmentTables& tables);
+/// @param channels  as LightSet's
+EnvironmentIrradiance environment_irradiance(const EnvironmentTables& tables, Vec3f channels);
 
-/// Fills in what is known of all of the environment's light: flux density and solid angle.
+/// Fills in what is known of all of the environment's light: flux density, colour and solid angle.
 void environment_integrate(LightSet& set);
 
 }  // namespace relief

@@ -29,6 +29,7 @@ struct SceneTree {
   std::vector<TreePointer> parts;                            ///< that are instanced
   float pad = 0;                                             ///< of its boxes, metres
   Box3 target = box_empty();                                 ///< of all but lights that are far away, world
+  float near_lengths = 0;  ///< of it, from which rays need not be moved: see RayTarget
   ContentHash content;                                       ///< of all that it is made of; unused if nothing is kept
   std::uint64_t num_in_place = 0;                            ///< meshes that are part of this tree itself
   std::uint64_t bytes = 0;

@@ -31,6 +31,34 @@ void lamps_scale(const KernelGlobals& globals, std::span<Light> lights)
   });
 }
 
+/// Of LightSet::channels. What counts is how much light of a channel there is in the middle of the scene.
+Vec3f channel_weights(const Scene& scene, const LightSet& set)
+{
+  const Vec3f size = scene.bounds_high - scene.bounds_low;
+  const float square = size.x >= 0.0f ? max(0.25f * dot(size, size), 1e-20f) : 1.0f;
+  Vec3f all = set.environment_color * kPi;
+  std::size_t next_shared = 0;
+  for (std::size_t i = 0; i < set.lights.size(); ++i) {
+    while (next_shared < set.shared.size() &&
+           i >= set.shared[next_shared].first_light + set.shared[next_shared].num_lights) {
+      ++next_shared;
+    }
+    const bool is_shared = next_shared < set.shared.size() && i >= set.shared[next_shared].first_light;
+    const Light& light = set.lights[i];
+    float brings = is_shared ? static_cast<float>(set.shared[next_shared].num_copies) : 1.0f;
+    if (!set.emission_scales.empty()) brings *= set.emission_scales[i];
+    if (!light_is_sun(light)) brings *= light_bounds(light, 1.0f).intensity / square;
+    const Vec3f emitted = abs(light.emission) * brings;
+    if (is_finite(emitted)) all += emitted;
+  }
+  const float mean = light_scalar(all);
+  if (!(mean > 0.0f) || !(mean < 1e30f) || (all.x == all.y && all.y == all.z)) return {1, 1, 1};
+  // Of which there is next to nothing shows nowhere.
+  constexpr float kLittle = 0.05f;
+  const Vec3f weights = Vec3f{1, 1, 1} / (all * (1.0f / mean) + splat3(kLittle));
+  return weights * (1.0f / light_scalar(weights));
+}
+
 }  // namespace
 
 LightSet light_set_make(const Scene& scene,
@@ -52,18 +80,19 @@ LightSet light_set_make(const Scene& scene,
     set.environment = environment_tables_make(texture_view(environment.texture_index), environment.color,
                                               environment.rotation, density);
   }
-  set.environment_irradiance = environment_irradiance(set.environment);
   environment_integrate(set);
   set.environment_casts_caustics = scene.environment.casts_caustics && scene.environment.hidden_from == 0;
-  // Where some kinds of rays alone see it, only a path that goes there knows of which kind it is.
-  if (scene.environment.hidden_from != 0) set.environment_irradiance = {};
-
   set.lights = scene.lights;
   // Likewise of lamps: photons come to a surface as no kind of ray.
   for (Light& light : set.lights) light.casts_caustics = light.casts_caustics && light.hidden_from == 0;
   if (globals != nullptr) set.motions = globals->lights.motions;
   if (globals != nullptr) lamps_scale(*globals, set.lights);
   emissive_meshes_add(scene, textures, globals, set);
+  set.channels = channel_weights(scene, set);
+  // Where some kinds of rays alone see it, only a path that goes there knows of which kind it is.
+  if (scene.environment.hidden_from == 0) {
+    set.environment_irradiance = environment_irradiance(set.environment, set.channels);
+  }
   light_tree_build(set);
   if (!set.environment.environment.has_map && density == EnvironmentDensity::kExcess) {
     // Where the other lights are weaker than this, leaving the environment to the BSDF costs more variance than it saves:
@@ -71,7 +100,7 @@ LightSet light_set_make(const Scene& scene,
     constexpr float kYieldingRatio = 0.125f;
     set.environment_yields_to = kYieldingRatio * set.environment_irradiance.mean;
     float suns = 0;
-    for (const std::uint32_t sun : set.suns) suns += light_scalar(set.lights[sun].emission);
+    for (const std::uint32_t sun : set.suns) suns += light_scalar(set.lights[sun].emission, set.channels);
     // Decided for the whole scene, so that sides turned away from the sun save their shadow rays.
     // What some rays pass and others not makes light that is asked for another than light that is found. Cycles finds it.
     const bool rays_differ =
@@ -109,6 +138,7 @@ LightsView LightSet::view() const
   if (one_finite() && suns.empty() && !(environment_irradiance.mean > 0.0f)) {
     v.only_light = static_cast<std::int32_t>(tree_blocks[0].link[0] & kLightTreeIndexMask);
   }
+  v.channels = channels;
   v.suns = suns.data();
   v.num_suns = static_cast<std::uint32_t>(suns.size());
   v.has_sun_disks =

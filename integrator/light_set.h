@@ -27,6 +27,9 @@ struct LightSet {
   std::vector<Light> lights;
   std::vector<float>
       emission_scales;  ///< one a light, >= 0: mean of the texture that will multiply its emission; empty: all 1
+  /// Weights of channels where lights are compared, 1 on average: what few lights send counts for more, as its noise is seen beside that
+  /// little light alone.
+  Vec3f channels{1, 1, 1};
   std::vector<std::int32_t> first_light_index;  ///< one an instance: light of its triangle 0; −1: does not emit
   std::vector<std::int32_t> light_copy_index;   ///< one an instance: into `copies`; −1: shares its lights with none
   std::vector<LightCopy> copies;
@@ -40,6 +43,7 @@ struct LightSet {
   EnvironmentIrradiance environment_irradiance;  ///< of what next-event estimation samples of it
   float environment_yields_to = kInfinity;       ///< see LightsView
   double environment_flux_density = 0;           ///< π × mean radiance of all of it, W/m²
+  Vec3f environment_color;                       ///< of that: mean radiance
   double environment_solid_angle = 0;      ///< (∫L)² / ∫L²: how wide an even light of its contrast would be, sr
   bool environment_casts_caustics = true;  ///< as Light::casts_caustics
   const MotionView* motions = nullptr;     ///< as LightsView::motions

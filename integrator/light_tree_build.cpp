@@ -50,11 +50,12 @@ LightBounds bounds_union(const LightBounds& a, const LightBounds& b)
 
 Vec3f bounds_centre(const LightBounds& bounds) { return bounds.low * 0.5f + bounds.high * 0.5f; }
 
-/// @param scale  mean of the emission texture
-/// @return       intensity 0: the light never needs choosing
-LightBounds light_bounds_of(const Light& light, float scale)
+/// @param channels  as LightSet's
+/// @param scale     mean of the emission texture
+/// @return          intensity 0: the light never needs choosing
+LightBounds light_bounds_of(const Light& light, Vec3f channels, float scale)
 {
-  LightBounds bounds = light_bounds(light, light_scalar(light.emission) * scale);
+  LightBounds bounds = light_bounds(light, light_scalar(light.emission, channels) * scale);
   const bool usable = bounds.intensity > 0.0f && is_finite(bounds.low) && is_finite(bounds.high);
   if (!usable) return {};
   bounds.intensity = std::min(bounds.intensity, 1e30f);
@@ -75,7 +76,7 @@ LightBounds moving_bounds(const LightSet& set, std::uint32_t index, float scale)
   for (int i = 0; i <= kTimes; ++i) {
     Light storage;
     const Light& light = lights_at(view, {static_cast<std::int32_t>(index)}, storage, static_cast<float>(i) / kTimes);
-    const LightBounds one = light_bounds_of(light, scale);
+    const LightBounds one = light_bounds_of(light, set.channels, scale);
     if (!(one.intensity > 0.0f)) return {};
     if (i > 0) {
       farthest = std::max({farthest, length(one.low - before.low), length(one.high - before.high)});
@@ -382,7 +383,7 @@ LightBounds shared_build(LightSet& set, const SharedLights& shared)
   std::vector<BuildLight> lights;
   for (std::uint32_t i = shared.first_light; i < shared.first_light + shared.num_lights; ++i) {
     const LightBounds bounds =
-        light_bounds_of(set.lights[i], set.emission_scales.empty() ? 1.0f : set.emission_scales[i]);
+        light_bounds_of(set.lights[i], set.channels, set.emission_scales.empty() ? 1.0f : set.emission_scales[i]);
     if (bounds.intensity > 0.0f) lights.push_back({bounds, bounds_centre(bounds), i | kLightTreeLeaf});
   }
   if (lights.empty()) return {};
@@ -416,7 +417,7 @@ LightBounds copy_bounds(const LightSet& set,
   for (std::uint32_t i = shared.first_light; i < shared.first_light + shared.num_lights; ++i) {
     Light storage;
     const LightRef ref{static_cast<std::int32_t>(i), static_cast<std::int32_t>(copy)};
-    const LightBounds one = light_bounds_of(lights_at(view, ref, storage), 1.0f);
+    const LightBounds one = light_bounds_of(lights_at(view, ref, storage), set.channels, 1.0f);
     bounds.low = min(bounds.low, one.low);
     bounds.high = max(bounds.high, one.high);
   }
@@ -446,7 +447,7 @@ void light_tree_build(LightSet& set)
     }
     const float scale = set.emission_scales.empty() ? 1.0f : set.emission_scales[i];
     const LightBounds bounds =
-        light.motion_index >= 0 ? moving_bounds(set, index, scale) : light_bounds_of(light, scale);
+        light.motion_index >= 0 ? moving_bounds(set, index, scale) : light_bounds_of(light, set.channels, scale);
     if (bounds.intensity > 0.0f) finite.push_back({bounds, bounds_centre(bounds), index | kLightTreeLeaf});
   }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "integrator/graph_bounds_stage.h"
@@ -34,6 +35,11 @@ constexpr float kSampledMargin = 2.0f;
 constexpr float kWall = 1e5f, kWorldWall = 2e3f;
 /// And below which no bound is too large.
 constexpr float kThin = 100.0f;
+
+/// Optical depth from corner to corner below which there is nothing: bounds on what is 0 are a little above.
+constexpr float kNothing = 1e-12f;
+/// Of a place, so much is filled where it is worth while to make its boxes again, as fine as they get.
+constexpr float kMuchLess = 0.5f;
 
 constexpr GraphRay kSomeRay{1u << static_cast<int>(GraphRayKind::kCamera)};
 
@@ -250,6 +256,31 @@ Boxes boxes_of_group(const RateGrid& grid, Vec3f middle, float scale, std::size_
   return boxes;
 }
 
+float volume_of(const Box3& box)
+{
+  const Vec3f size = box.high - box.low;
+  return size.x * size.y * size.z;
+}
+
+/// The part of a grid of one level in which rays look for something.
+std::optional<Box3> filled_part(const RateGrid& grid)
+{
+  Vec3f first = splat3(kInfinity), last = splat3(-kInfinity);
+  const RateBox* box = grid.boxes;
+  for (int z = 0; z < grid.size; ++z) {
+    for (int y = 0; y < grid.size; ++y) {
+      for (int x = 0; x < grid.size; ++x, ++box) {
+        if (!(box->residual > 0.0f || box->shows > 0.0f)) continue;
+        const Vec3f at{static_cast<float>(x), static_cast<float>(y), static_cast<float>(z)};
+        first = min(first, at);
+        last = max(last, at);
+      }
+    }
+  }
+  if (!(first.x <= last.x)) return std::nullopt;
+  return Box3{grid.low + first * grid.cell, grid.low + (last + Vec3f{1, 1, 1}) * grid.cell};
+}
+
 /// What a ray from the camera may reach in few steps: all that is there, and the camera.
 Box3 world_box(const SceneContext& context)
 {
@@ -350,15 +381,33 @@ VaryingMedia::Problem VaryingMedia::add_rates(const SceneContext& context,
     const auto mesh = static_cast<std::size_t>(context.scene.instances[static_cast<std::size_t>(instance)].mesh_index);
     fit_generated(context.meshes[mesh], place);
   }
-  RateGrid& grid = place.rates;
-  grid.size = is_world ? kWorldBoxes : size_;
-  grid.num_levels = is_world ? kWorldLevels : 1;
-  grid.low = box.low;
-  grid.cell = max((box.high - box.low) / static_cast<float>(grid.size), splat3(1e-20f));
   const float diagonal = length(box.high - box.low);
   place.densest = (is_world ? kWorldWall : kWall) / diagonal;
+  const RatesOf of{context, medium, instance, diagonal, is_world ? kWorldBoxes : size_, is_world ? kWorldLevels : 1};
+  Problem problem = make_rates(of, box, place, boxes_[index]);
+  if (is_world) return problem;
+  const std::optional<Box3> filled = filled_part(place.rates);
+  if (!filled) {
+    place.rates.boxes = nullptr;
+    boxes_[index] = {};
+  } else if (volume_of(*filled) < kMuchLess * volume_of(box)) {
+    problem = make_rates(of, *filled, place, boxes_[index]);
+  }
+  return problem;
+}
+
+VaryingMedia::Problem VaryingMedia::make_rates(const RatesOf& of,
+                                               Box3 box,
+                                               VaryingPlace& place,
+                                               std::vector<RateBox>& all)
+{
+  const auto& [context, medium, instance, diagonal, size, num_levels] = of;
+  RateGrid& grid = place.rates;
+  grid.size = size;
+  grid.num_levels = num_levels;
+  grid.low = box.low;
+  grid.cell = max((box.high - box.low) / static_cast<float>(size), splat3(1e-20f));
   const std::size_t side = static_cast<std::size_t>(grid.size), level_size = side * side * side;
-  std::vector<RateBox>& all = boxes_[index];
   all.assign(level_size * static_cast<std::size_t>(grid.num_levels), {});
   const GraphBoundsRun run_bounds = graph_bounds_select();
   const std::span<const ImageBounds> images = context.scene.textures->height_bounds();
@@ -419,7 +468,7 @@ VaryingMedia::Problem VaryingMedia::add_rates(const SceneContext& context,
         problem.has_bounds = problem.has_bounds && level > 0;
       }
       RateBox& known = all[static_cast<std::size_t>(level) * level_size + i];
-      known = box_of(found[i], rate, corner_to_corner);
+      if (rate * diagonal * scale > kNothing) known = box_of(found[i], rate, corner_to_corner);
       // What only shines has to be met as well.
       if (rates[i].emits) known.shows += 1.0f / (diagonal * scale);
     }

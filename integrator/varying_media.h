@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "kernel/math/box.h"
 #include "kernel/volume/varying_place.h"
 
 namespace relief {
@@ -28,7 +29,16 @@ class VaryingMedia {
   struct Problem {
     bool has_bounds = true, is_tamed = false;  ///< the latter is not told of the world, whose fog often grows downwards
   };
+  /// Whose boxes, and how many: see RateGrid.
+  struct RatesOf {
+    const SceneContext& context;
+    const VaryingMedium& medium;
+    std::int32_t instance;
+    float diagonal;  ///< metres, of all of it
+    std::int32_t size, num_levels;
+  };
   Problem add_rates(const SceneContext& context, const VaryingMedium& medium, std::int32_t instance);
+  static Problem make_rates(const RatesOf& of, Box3 box, VaryingPlace& place, std::vector<RateBox>& all);
 
   std::vector<VaryingMedium> media_;
   std::vector<VaryingPlace> places_;

@@ -24,15 +24,17 @@ _running = None
 class Capture:
     """Collects frames into one scene file.
 
-    @param  path  of the scene file; buffers go to a folder beside it, named after it
+    @param  path       of the scene file; buffers go to a folder beside it, named after it
+    @param  has_lines  the scene's pictures get Freestyle lines
     """
 
-    def __init__(self, path):
+    def __init__(self, path, has_lines):
         folder, self._name = os.path.split(os.path.abspath(path))
         stem = os.path.splitext(self._name)[0]
         self._writer = GltfWriter(folder, f"{stem}_data")
         self._shot = None
         self._fixed = None
+        self._has_lines = has_lines
         self.report = None
 
     def add(self, engine, depsgraph):
@@ -44,7 +46,7 @@ class Capture:
         final.warn_unread(scene, self.report)
         view, crop = final.view_of(engine, depsgraph, self.report)
         for is_on, what, instead in (
-            (scene.render.use_freestyle, "Freestyle lines", "they are left out"),
+            (self._has_lines, "Freestyle lines", "they are left out"),
             (scene.render.use_multiview, "stereoscopy", "the scene's camera alone was used"),
         ):
             if is_on:
@@ -91,11 +93,14 @@ def export_frames(scene, path, frames):
     @error          ReliefError with what an engine would have reported
     """
     global _running
-    before = scene.render.engine, scene.frame_current, scene.render.use_compositing, scene.render.use_sequencer
-    _running = Capture(path)
+    # What Blender would do with the picture, which there is none of.
+    after = ("use_compositing", "use_sequencer", "use_freestyle")
+    before = scene.render.engine, scene.frame_current, [getattr(scene.render, name) for name in after]
+    _running = Capture(path, scene.render.use_freestyle)
     try:
         scene.render.engine = "RELIEF"
-        scene.render.use_compositing = scene.render.use_sequencer = False
+        for name in after:
+            setattr(scene.render, name, False)
         for frame in frames:
             scene.frame_set(frame)
             bpy.ops.render.render(scene=scene.name)
@@ -104,7 +109,9 @@ def export_frames(scene, path, frames):
         raise ReliefError(str(error).removeprefix("Error: ").strip()) from error
     finally:
         _running = None
-        scene.render.engine, frame, scene.render.use_compositing, scene.render.use_sequencer = before
+        scene.render.engine, frame, values = before
+        for name, value in zip(after, values):
+            setattr(scene.render, name, value)
         scene.frame_set(frame)
 
 

@@ -53,6 +53,7 @@ struct LightsView {
   std::int32_t only_light = -1;              ///< the one finite light, where nothing else can be chosen
   const std::uint32_t* suns = nullptr;       ///< indices into `lights`
   std::uint32_t num_suns = 0;
+  Vec3f channels{1, 1, 1};     ///< see LightSet
   bool has_sun_disks = false;  ///< one of them is_sun_disk: rays that meet nothing may see it
   EnvironmentView environment;
   EnvironmentIrradiance environment_irradiance;
@@ -112,15 +113,16 @@ RELIEF_KERNEL const Light& lights_at(const LightsView& view, LightRef ref, Light
 }
 
 /// Mean of the three channels, those that take light away as those that give it: the scalar by which lights are compared.
-RELIEF_KERNEL float light_scalar(Vec3f rgb)
+/// @param channels  their weights, 1 on average
+RELIEF_KERNEL float light_scalar(Vec3f rgb, Vec3f channels = {1, 1, 1})
 {
-  const Vec3f size = abs(rgb);
-  return (size.x + size.y + size.z) * (1.0f / 3.0f);
+  return dot(abs(rgb), channels) * (1.0f / 3.0f);
 }
 
 /// Estimate of what one sun brings, its irradiance where nothing is glossy; 0 where all of it is below the horizon of N. Its cosine near
 /// the horizon is estimated as light_tree_estimate does.
-RELIEF_KERNEL float light_sun_importance(const Light& sun, const LightReceiver& at)
+/// @param channels  as LightsView::channels
+RELIEF_KERNEL float light_sun_importance(const Light& sun, Vec3f channels, const LightReceiver& at)
 {
   const Vec3f N = at.N;
   float cosine = is_zero(N) ? 1.0f : -dot(N, sun.axis);
@@ -134,14 +136,14 @@ RELIEF_KERNEL float light_sun_importance(const Light& sun, const LightReceiver& 
     const float shown = light_gloss_eval(gloss, off, sun.cone * (2.0f - sun.cone));
     cosine = (1.0f - gloss.share) * cosine + gloss.share * shown;
   }
-  return min(light_scalar(sun.emission) * cosine, 1e30f);
+  return min(light_scalar(sun.emission, channels) * cosine, 1e30f);
 }
 
 RELIEF_KERNEL LightGroups light_groups_eval(const LightsView& view, Vec3f P, const LightReceiver& at)
 {
   LightGroups groups;
   for (std::uint32_t i = 0; i < view.num_suns; ++i) {
-    groups.sun_sum += light_sun_importance(view.lights[view.suns[i]], at);
+    groups.sun_sum += light_sun_importance(view.lights[view.suns[i]], view.channels, at);
   }
   if (view.tree.blocks != nullptr) light_tree_estimate(view.tree, view.tree.root, P, at, groups.finite_root);
 
@@ -217,7 +219,7 @@ RELIEF_KERNEL LightsChoice lights_choose(const LightsView& view, Vec3f P, const 
     double target = choice * scale;
     LightsChoice chosen;
     for (std::uint32_t i = 0; i < view.num_suns; ++i) {
-      const float importance = light_sun_importance(view.lights[view.suns[i]], at);
+      const float importance = light_sun_importance(view.lights[view.suns[i]], view.channels, at);
       if (!(importance > 0.0f)) continue;
       const double width = static_cast<double>(importance);
       chosen = {{static_cast<std::int32_t>(view.suns[i])},
@@ -299,7 +301,7 @@ RELIEF_KERNEL float lights_pdf(const LightsView& view,
 RELIEF_KERNEL float lights_sun_pdf(const LightsView& view, Vec3f P, const LightReceiver& at, std::uint32_t sun_index)
 {
   const Light& sun = view.lights[sun_index];
-  const float importance = light_sun_importance(sun, at);
+  const float importance = light_sun_importance(sun, view.channels, at);
   if (!(importance > 0.0f)) return 0.0f;
   const LightGroups groups = light_groups_eval(view, P, at);
   return groups.suns * (importance / groups.sun_sum) * sun_light_pdf(sun);

@@ -82,12 +82,19 @@ RELIEF_KERNEL std::int32_t medium_of_instance(const KernelGlobals& g, std::int32
   return instance == kWholeWorld ? g.world_medium : g.materials[g.instances[instance].material_index].medium_index;
 }
 
+/// What an instance, or the world, is filled with that varies; null: nothing.
+RELIEF_KERNEL const VaryingMedium* medium_that_varies(const KernelGlobals& g, std::int32_t instance)
+{
+  const VaryingMedium& medium = g.varying_media[medium_of_instance(g, instance)];
+  return medium.num_closures > 0 && varying_place(medium, instance).rates.boxes != nullptr ? &medium : nullptr;
+}
+
 /// Whether one of the media that a point is in varies.
 RELIEF_KERNEL bool media_vary(const KernelGlobals& g, const MediumState& m)
 {
   if (g.varying_media == nullptr) return false;
   for (int i = 0; i < m.size; ++i) {
-    if (g.varying_media[medium_of_instance(g, m.inside[i])].num_closures > 0) return true;
+    if (medium_that_varies(g, m.inside[i]) != nullptr) return true;
   }
   return false;
 }
@@ -220,12 +227,12 @@ medium_walk_make(const KernelGlobals& g, const MediumState& m, Vec3f O, Vec3f D,
   walk.length = length;
   walk.numbers.state = seed;
   for (int i = 0; i < m.size; ++i) {
-    const std::int32_t index = medium_of_instance(g, m.inside[i]);
-    if (g.varying_media[index].num_closures == 0) {
-      media_add(walk.even, g.media[index]);
+    const VaryingMedium* varying = medium_that_varies(g, m.inside[i]);
+    if (varying == nullptr) {
+      media_add(walk.even, g.media[medium_of_instance(g, m.inside[i])]);
     } else {
       walk.instances[walk.size] = m.inside[i];
-      walk.media[walk.size++] = &g.varying_media[index];
+      walk.media[walk.size++] = varying;
     }
   }
   walk_find(walk);

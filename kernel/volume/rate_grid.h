@@ -23,7 +23,8 @@ struct RateGrid {
   Vec3f cell;             ///< lengths of a box of level 0, metres, above 0
   std::int32_t size = 0;  ///< boxes along each axis; of several levels a multiple of 4
   std::int32_t num_levels = 1;
-  const RateBox* boxes = nullptr;  ///< level by level, x first; a level's middle boxes are there, too
+  /// Level by level, x first; a level's middle boxes are there, too. Null: there is nothing anywhere.
+  const RateBox* boxes = nullptr;
 };
 
 RELIEF_KERNEL Vec3f rate_grid_middle(const RateGrid& grid)

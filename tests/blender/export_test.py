@@ -325,6 +325,29 @@ def test_linked_duplicates_are_evaluated_once():
     assert [linked[name][0][1] for name in ("plain", "blue", "text", "red text")] == ["red", "blue", "yellow", "red"]
 
 
+def test_freestyle_draws_nothing_for_an_export():
+    import parameter_editor
+    from relief.exporter import export_frames
+
+    scene = new_scene()
+    scene.relief.strict = False
+    scene.render.use_freestyle = True
+    scene.render.use_compositing = False
+    add_camera()
+    add_sphere(0.4, segments=8)
+    drawn = []
+    note = lambda scene, layer, lineset: drawn.append(lineset)
+    parameter_editor.callbacks_lineset_pre.append(note)
+    try:
+        with folder() as path:
+            warnings, _ = export_frames(scene, f"{path}/scene.gltf", [1])
+    finally:
+        parameter_editor.callbacks_lineset_pre.remove(note)
+    assert not drawn
+    assert any("Freestyle" in w for w in warnings), warnings
+    assert scene.render.use_freestyle and not scene.render.use_compositing and scene.render.use_sequencer
+
+
 def test_every_linked_duplicate_has_its_warning():
     from relief.exporter import export_frames
 

@@ -238,7 +238,8 @@ TEST(FarRaysOnPlainMeshes, HitThemWhetherInPlaceOrInstances)
       if (instanced) scene.instances.push_back(scene.instances[0]);
       const SceneContext context(scene, {});
       const double size = length(to_double(m.x)) + length(to_double(m.y));
-      for (const double distance : kDistances) {
+      // From 16 lengths on rays are moved, of instances from one.
+      for (const double distance : {1e-2, 0.9, 1.1, 4.0, 15.0, 17.0, 1e3, 3e4, 1e6}) {
         std::mt19937_64 random(9);
         std::vector<TraceRay> rays;
         while (rays.size() < 1000) {

@@ -50,6 +50,43 @@ TEST(VaryingMedia, LetThroughWhatTheIntegralOfTheirDensitySays)
   expect_mean(scene, 64, std::exp(-2.0 / 3), 1e-6, 2);
 }
 
+/// Absorbs where z is above a height, by how much it is.
+VolumeProgram absorbing_above(double height)
+{
+  Varying v;
+  const GraphScalar none = v.number(0), above = v.build(Op::maximum, {v.z(1, -height), none});
+  v.add(VolumeClosureKind::kAbsorption, {none, none, none, above});
+  return v.program();
+}
+
+TEST(VaryingMedia, AreLookedForInThePartOfTheirMeshThatIsFilled)
+{
+  Scene scene = view();
+  scene.environment.color = {1, 1, 1};
+  add_varying(scene, box_mesh({1, 1, 1}), absorbing_above(0.5));
+  const SceneContext context(scene);
+  const RateGrid& grid = varying_place(context.globals.varying_media[0], 0).rates;
+  const float size = static_cast<float>(grid.size);
+  // A box of a grid of all of the mesh, on one side; the other ends where it does.
+  EXPECT_NEAR(grid.low.z, 0.5f, 2.0f / size);
+  EXPECT_NEAR(grid.low.z + grid.cell.z * size, 1.0f, 1e-3f);
+  expect_mean(scene, 64, std::exp(-0.125), 1e-6);
+}
+
+TEST(VaryingMedia, ThatAreNothingAreNotAsked)
+{
+  Scene scene = view();
+  scene.environment.color = {1, 1, 1};
+  add_varying(scene, box_mesh({1, 1, 1}), absorbing_above(2));
+  const SceneContext context(scene);
+  EXPECT_EQ(medium_that_varies(context.globals, 0), nullptr);
+  MediumState inside{};
+  inside.inside[0] = 0;
+  inside.size = 1;
+  EXPECT_FALSE(media_vary(context.globals, inside));
+  expect_mean(scene, 64, 1.0, 1e-6);
+}
+
 TEST(VaryingMedia, AddUpWithOthersAndWithEvenOnes)
 {
   Scene scene = view();

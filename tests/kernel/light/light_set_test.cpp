@@ -330,13 +330,32 @@ TEST(LightSet, EnvironmentIrradianceIsNeverNothingInAnyDirection)
   EXPECT_GT(set.environment_irradiance.mean, 0.0f);
 }
 
+TEST(LightSet, WhatFewLightsSendIsLookedForMoreOften)
+{
+  Scene scene;
+  scene.lights.resize(2);
+  for (Light& light : scene.lights) light.kind = LightKind::kPoint;
+  scene.lights[0].emission = {0, 10, 10};
+  scene.lights[1].emission = {1, 0, 0};
+  const auto red_share = [&scene] { return choice_probability(light_set_make(scene, {}), {0, 0, -5}, 1); };
+  // By weights 1 / (share of the mean + 1/20): 1 / (1/7 + .05) of red, 1 / (10/7 + .05) of the others.
+  const double red = 1 / (1.0 / 7 + 0.05), others = 1 / (10.0 / 7 + 0.05);
+  EXPECT_NEAR(static_cast<double>(red_share()), red / (red + 2 * 10 * others), 0.01);
+  // Of grey light channels count alike.
+  scene.lights[0].emission = {7, 7, 7};
+  scene.lights[1].emission = {1, 1, 1};
+  EXPECT_EQ(light_set_make(scene, {}).channels, (Vec3f{1, 1, 1}));
+  EXPECT_NEAR(red_share(), 0.125f, 0.01f);
+}
+
 TEST(LightSet, ConstantEnvironmentsIrradianceIsPiTimesItsRadiance)
 {
   Scene scene;
   scene.environment.color = {1, 2, 3};
   const LightSet set = light_set_make(scene, {});
   for (const Vec3f N : {Vec3f{}, Vec3f{0, 0, 1}, normalize(Vec3f{1, -2, 3})}) {
-    EXPECT_FLOAT_EQ(environment_irradiance_eval(set.environment_irradiance, N), 2 * kPi);
+    EXPECT_FLOAT_EQ(environment_irradiance_eval(set.environment_irradiance, N),
+                    light_scalar(scene.environment.color, set.channels) * kPi);
   }
   scene.environment.color = {};
   EXPECT_FALSE(light_set_make(scene, {}).any());
