@@ -192,6 +192,7 @@ Accel::Accel(const Scene& scene,
     : shadow_filter_(shadow_filter),
       displacements_(&displacements),
       views_(&views),
+      instances_(scene.instances),
       trees_(trees != nullptr ? std::move(trees) : std::make_shared<KeptTrees>(false))
 {
   for (std::size_t d = 0; d < displacements.size(); ++d) displacements.geometry(d).shadow_filter = nullptr;

@@ -103,6 +103,13 @@ class Accel {
   const SceneMotion& motion() const { return views_->motion; }
   Box3 bounds() const;  ///< of all that rays can hit, world
   bool has_curves() const { return has_curves_; }
+  /// Whether two numbers are of parts of one object, which has one a material. @param b  an instance's
+  bool are_of_one_object(unsigned a, unsigned b) const
+  {
+    if (a == b) return true;
+    return a < instances_.size() && instances_[a].object_index >= 0 &&
+           instances_[a].object_index == instances_[b].object_index;
+  }
   /// Of a displaced geometry's prisms or micro-triangles, object space.
   Box3 displaced_bounds(std::size_t geometry) const { return displaced_[geometry].box; }
   std::size_t bytes() const { return trees_->bytes(); }   ///< allocated by Embree
@@ -175,6 +182,7 @@ class Accel {
   RTCFilterFunctionN shadow_filter_;
   const DisplacementSet* displacements_;
   const SceneViews* views_;
+  std::span<const Instance> instances_;  ///< of the scene
   std::shared_ptr<KeptTrees> trees_;
   KeptTrees::Tally kept_;
   RayTarget target_;                     ///< all that rays can hit, but for lights that are far away; world

@@ -35,15 +35,6 @@ struct LookingRay {
   unsigned mask;
 };
 
-/// Whether what a ray met belongs to an instance's object, which has one instance a material.
-bool is_of_object(const SceneContext& context, unsigned met, std::int32_t instance)
-{
-  const auto& instances = context.scene.instances;
-  if (met >= instances.size()) return false;
-  const auto own = static_cast<std::size_t>(instance);
-  return met == own || (instances[met].object_index >= 0 && instances[met].object_index == instances[own].object_index);
-}
-
 RTCRayHit ray_make(const LookingRay& looking)
 {
   RTCRayHit ray{};
@@ -73,7 +64,9 @@ float open_share(const void* scene, const GraphOpenShare& question)
     // By the smooth normal rays leave on either side of a facet, which itself is never in their way.
     const Vec3f& from = dot(D, Ng) > 0.0f ? O[0] : O[1];
     // The closest hits, for what lets shadow rays through in part stops these.
-    const auto stops = [&](unsigned met) { return !is_local || is_of_object(context, met, question.instance); };
+    const auto stops = [&](unsigned met) {
+      return !is_local || context.accel->are_of_one_object(met, static_cast<unsigned>(question.instance));
+    };
     EmbreeContext embree;
     embree_context_init(embree, false);
     RTCRayHit ray = ray_make({from, D, question.distance, question.time, mask});
@@ -152,7 +145,9 @@ Vec3f bevel(const void* scene, const GraphBevel& question)
     EmbreeContext embree;
     embree_context_init(embree, false);
     RTCRayHit ray = ray_make({P + (along * half + across * r) * radius, -along, length_along, question.time, ~0u});
-    const auto is_own = [&](unsigned met) { return is_of_object(context, met, question.instance); };
+    const auto is_own = [&](unsigned met) {
+      return context.accel->are_of_one_object(met, static_cast<unsigned>(question.instance));
+    };
     for (;;) {
       const unsigned met = context.accel->intersect_only(embree, ray, is_own);
       if (met == RTC_INVALID_GEOMETRY_ID) break;

@@ -4,8 +4,9 @@
 
 #include "integrator/path_lod.h"
 #include "kernel/bsdf/subsurface.h"
+#include "kernel/bsdf/subsurface_profile.h"
 #include "kernel/math/rounding.h"
-#include "kernel/stage/path_access.h"
+#include "kernel/stage/surface_interaction.h"
 #include "kernel/volume/distance.h"
 #include "kernel/volume/henyey_greenstein.h"
 
@@ -77,23 +78,83 @@ struct Walker {
   PathState& state;
   EmbreeContext context{};
 
-  /// The nearest hit on the object that a path is in.
-  bool meet(std::uint32_t path, Vec3f P, Vec3f D, float t_max, RTCRayHit& ray);
+  /// The nearest hit on the object that a path is in, on whichever of its parts.
+  /// @param t_min  0, or behind a hit
+  /// @return       the part, an instance; RTC_INVALID_GEOMETRY_ID: none is met
+  unsigned meet(std::uint32_t path, Vec3f P, Vec3f D, float t_min, float t_max, RTCRayHit& ray);
   bool walk(std::uint32_t path);
+  bool leave_by_profile(std::uint32_t path);
+  /// Takes a hit for the path's.
+  void take(std::uint32_t path, unsigned part, const RTCRayHit& ray);
 };
 
-bool Walker::meet(std::uint32_t path, Vec3f P, Vec3f D, float t_max, RTCRayHit& ray)
+unsigned Walker::meet(std::uint32_t path, Vec3f P, Vec3f D, float t_min, float t_max, RTCRayHit& ray)
 {
   ray.ray.org_x = P.x, ray.ray.org_y = P.y, ray.ray.org_z = P.z;
   ray.ray.dir_x = D.x, ray.ray.dir_y = D.y, ray.ray.dir_z = D.z;
-  ray.ray.tnear = 0.0f;
+  ray.ray.tnear = t_min;
   ray.ray.tfar = t_max;
   ray.ray.time = path_time(state, path);
   ray.ray.mask = ~0u;
   ray.ray.id = 0;
   ray.ray.flags = 0;
   const std::uint32_t own = state.hit_object[path];
-  return accel.intersect_only(context, ray, [own](unsigned object) { return object == own; }) == own;
+  return accel.intersect_only(context, ray, [this, own](unsigned object) {
+    return accel.are_of_one_object(object, own) && (g.instances[object].flags & kCurves) == 0;
+  });
+}
+
+void Walker::take(std::uint32_t path, unsigned part, const RTCRayHit& ray)
+{
+  state.hit_object[path] = part;
+  state.hit_triangle[path] = ray.hit.primID;
+  state.hit_u[path] = ray.hit.u;
+  state.hit_v[path] = ray.hit.v;
+  path_resolve_hit(g, accel, state, path, ray.hit.Ng_x);
+}
+
+/// A path leaves by a profile: at one of the places where a probe meets its object, chosen by its share of what they carry together.
+bool Walker::leave_by_profile(std::uint32_t path)
+{
+  const SubsurfaceState& below = state.subsurface.entries[path];
+  const Vec3f free_path = below.surface.radius, P = path_origin(state, path);
+  WalkNumbers u(state.pixel_hash[path], state.sample_index[path]);
+  const ProfileProbe probe = profile_probe_make(free_path, P, -path_direction(state, path), u.next_2d());
+  float u_choice = u.next(), sum = 0.0f, t_min = 0.0f;
+  Vec3f P_left, N_left, carried;
+  RTCRayHit ray, left{};
+  unsigned left_part = RTC_INVALID_GEOMETRY_ID;
+  for (int hit = 0; hit < kMostSteps; ++hit) {
+    const unsigned part = meet(path, probe.O, probe.D, t_min, probe.length, ray);
+    if (part == RTC_INVALID_GEOMETRY_ID) break;
+    t_min = t_min_behind(ray.ray.tfar);
+    take(path, part, ray);
+    const Vec3f Ng = normalize(hit_plane(g, state, path, path_instance(g, state, path)).Ng);
+    const Vec3f P_hit = probe.O + ray.ray.tfar * probe.D;
+    const Vec3f gain = profile_probe_gain(probe, free_path, length(P_hit - P), Ng);
+    const float weight = mean_component(gain);
+    if (!(weight > 0.0f && weight < kInfinity)) continue;
+    sum += weight;
+    const float share = weight / sum;
+    if (!(u_choice < share)) {
+      u_choice = (u_choice - share) / (1.0f - share);
+      continue;
+    }
+    u_choice /= share;
+    left = ray;
+    left_part = part;
+    P_left = P_hit;
+    N_left = below.front ? Ng : -Ng;
+    carried = gain / weight;
+  }
+  if (!(sum > 0.0f)) return false;
+  const float way = length(P_left - P);
+  path_set_ray(state, path, P_left + way * N_left, -N_left);
+  state.hit_t[path] = way;
+  state.throughput[path] = path_throughput(state, path) * carried * sum;
+  take(path, left_part, left);
+  if (state.media != nullptr) state.media[path].hit_inside = kWholeWorld;
+  return true;
 }
 
 bool Walker::walk(std::uint32_t path)
@@ -153,7 +214,8 @@ bool Walker::walk(std::uint32_t path)
     constexpr float kFarInFreePaths = 10.0f;
     const float least_sigma = min(sigma_t.x, min(sigma_t.y, sigma_t.z));
     RTCRayHit ray;
-    bool is_out = meet(path, P, D, step == 0 ? max(t, kFarInFreePaths / least_sigma) : t, ray);
+    const unsigned part = meet(path, P, D, 0.0f, step == 0 ? max(t, kFarInFreePaths / least_sigma) : t, ray);
+    bool is_out = part != RTC_INVALID_GEOMETRY_ID;
     if (step == 0 && is_out) {
       across = max(dot(P + ray.ray.tfar * D - start, -N), 0.0f);
       is_out = ray.ray.tfar < t;
@@ -174,16 +236,13 @@ bool Walker::walk(std::uint32_t path)
     throughput *= (is_out ? passed : sigma_s * passed) / dot(chances, pdf);
     if (!is_finite(throughput)) return false;
     if (is_out) {
-      state.hit_triangle[path] = ray.hit.primID;
-      state.hit_u[path] = ray.hit.u;
-      state.hit_v[path] = ray.hit.v;
       // Paths come from outside to where they are shaded.
       path_set_ray(state, path, P + t * D, -D);
       state.hit_t[path] = t;
       state.throughput[path] = throughput;
       // What fills the object besides is not walked in.
       if (state.media != nullptr) state.media[path].hit_inside = kWholeWorld;
-      path_resolve_hit(g, accel, state, path, ray.hit.Ng_x);
+      take(path, part, ray);
       return true;
     }
     if (max_component(throughput) < kLeastCarried) return false;
@@ -205,7 +264,9 @@ void walk_below_surfaces(const KernelGlobals& g,
   walker.context.displacement = &displacement.total;
   walker.context.texels = accel.displacements().texels();
   for (std::uint32_t i = 0; i < queue.size; ++i) {
-    if (walker.walk(queue.paths[i])) queue_push(left, queue.paths[i]);
+    const std::uint32_t path = queue.paths[i];
+    const bool by_profile = state.subsurface.entries[path].surface.entry == SubsurfaceEntry::kProfile;
+    if (by_profile ? walker.leave_by_profile(path) : walker.walk(path)) queue_push(left, path);
   }
 }
 

@@ -6,7 +6,8 @@
 namespace relief {
 
 /// Lets every path in the queue walk from where its ray starts, inside the object that it has hit last, through what its
-/// SubsurfaceState says. Those that get out have hit the object from the outside then, against the way that they came.
+/// SubsurfaceState says, or leave it as far away as a profile has it. Those that get out have hit the object from the outside then,
+/// against the way that they came.
 /// @param left          gets these; the others end
 /// @param displacement  what these rays did is added to it
 /// @source  Chiang, Kutz, Burley 2016, "Practical and Controllable Subsurface Scattering for Production Path Tracing"; Křivánek and

@@ -112,7 +112,7 @@ SUBSURFACE_METHODS = {
     "RANDOM_WALK_LEGACY": "random-walk-legacy",
     "RANDOM_WALK": "random-walk" if IS_5_2 else "random-walk-legacy" if IS_4_0 else "random-walk-skin",
     "RANDOM_WALK_SKIN": "random-walk-skin",
-    "BURLEY": "random-walk-legacy",
+    "BURLEY": "christensen-burley",
 }
 
 #: Before 4.5 an Emission node in a volume, and what a Principled Volume emits, shines as bright whatever Mix Shaders take of it.

@@ -39,6 +39,7 @@ enum class SubsurfaceMethod : std::uint8_t {
   kRandomWalk,  ///< radii are mean free paths: 5.2's own
   kLegacy,      ///< 4π times as long as these: "Random Walk" of 4.0 to 5.1, "Fixed Radius" before
   kSkin,        ///< how far light comes up from where it went below; "Random Walk" up to 3.6
+  kProfile,     ///< as kLegacy, and what is walked there is a profile of distances here: "Christensen-Burley"
 };
 
 /// What a fibre's absorption follows from.

@@ -230,10 +230,11 @@ RELIEF_KERNEL float closure_eta(const MixtureBuild& b, float ior)
 }
 
 /// Whether a path may go below the surface. Before 5.0 Cycles left it at a diffuse surface after a diffuse event: it is not seen well
-/// then, and noisy.
+/// then, and noisy. With profiles it still does.
 RELIEF_KERNEL bool subsurface_enters(const MixtureBuild& b, const SurfaceClosureSpec& spec)
 {
-  return b.enters && (spec.maths >= Maths::k52 || !b.is_after_diffuse);
+  const bool always = spec.maths >= Maths::k52 && spec.subsurface != SubsurfaceMethod::kProfile;
+  return b.enters && (always || !b.is_after_diffuse);
 }
 
 /// How paths enter since 4.0.
@@ -266,10 +267,12 @@ RELIEF_KERNEL void subsurface_add(MixtureBuild& b,
   const bool is_walk = spec.subsurface == SubsurfaceMethod::kRandomWalk;
   s.anisotropy = clamp(s.anisotropy, spec.maths >= Maths::k52 ? -0.99f : 0.0f, is_walk ? 0.99f : 0.9f);
   s.is_similar = is_walk || s.anisotropy < 0.0f;
+  const bool is_profile = spec.subsurface == SubsurfaceMethod::kProfile;
+  if (is_profile) s.entry = SubsurfaceEntry::kProfile;
   s.entry_ior = clamp(s.entry_ior, 1.01f, 3.8f);
   const auto free_path = [&](float radius, float albedo) {
     if (is_walk) return radius;
-    if (spec.subsurface == SubsurfaceMethod::kLegacy) return radius * (0.25f * kInvPi);
+    if (is_profile || spec.subsurface == SubsurfaceMethod::kLegacy) return radius * (0.25f * kInvPi);
     return subsurface_free_path(radius, albedo, s.entry_ior);
   };
   Vec3f around = weight;

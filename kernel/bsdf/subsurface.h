@@ -117,12 +117,14 @@ RELIEF_KERNEL SubsurfaceMedium subsurface_medium(const Subsurface& s)
   return m;
 }
 
-/// Direction in which a path enters. Only its distribution is that of a rough interface: what of it would be lost between
+/// Direction in which a path enters; one that leaves by a profile does not, and is sent straight down. Only its distribution is that
+/// of a rough interface: what of it would be lost between
 /// the facets is not.
 /// @param wo  its frame, z > 0
 /// @return    below the surface, z < 0, unit
 RELIEF_KERNEL Vec3f subsurface_enter(const Subsurface& s, Vec3f wo, Vec2f u)
 {
+  if (s.entry == SubsurfaceEntry::kProfile) return {0, 0, -1};
   const bool is_either = s.entry == SubsurfaceEntry::kEither;
   if (s.entry == SubsurfaceEntry::kDiffuse || (is_either && u.x < 0.5f)) {
     if (is_either) u.x *= 2.0f;

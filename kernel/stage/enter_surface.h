@@ -17,8 +17,11 @@ RELIEF_KERNEL void path_enter_surface(PathState& state,
                                       const BsdfSample& bsdf,
                                       Vec3f throughput)
 {
-  state.subsurface.entries[path] = {lobe.shape.subsurface, lobe.frame.n, lobe.maths};
-  path_set_ray(state, path, surface_hit_origin(at.hit, at.hit.P, !at.side.front), from_local(at.side.frame, bsdf.wi));
+  const Subsurface& surface = lobe.shape.subsurface;
+  state.subsurface.entries[path] = {surface, lobe.frame.n, lobe.maths, at.side.front};
+  // Profiles lie on the surface as it is, whichever way its normal is bent.
+  const Vec3f D = surface.entry == SubsurfaceEntry::kProfile ? -at.side.Ng : from_local(at.side.frame, bsdf.wi);
+  path_set_ray(state, path, surface_hit_origin(at.hit, at.hit.P, !at.side.front), D);
   state.throughput[path] = throughput * bsdf.f / bsdf.pdf;
   state.cone_width[path] = at.cone.width;
   state.cone_spread[path] = 0.0f;

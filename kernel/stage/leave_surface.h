@@ -35,6 +35,7 @@ template <unsigned kFeatures>
   SurfaceInteraction at = surface_interaction_locate<kFeatures>(g, state, path, wo);
   MixtureLobes lobes;
   surface_interaction_resolve<kFeatures>(g, state, path, wo, at, lobes);
+  surface_interaction_frame<kFeatures>(g, state, path, wo, at);
   const Vec3f N = subsurface_normal(lobes, at.side.Ns);
   at.params = {};
   at.transmits = false;

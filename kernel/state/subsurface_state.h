@@ -10,6 +10,7 @@ struct SubsurfaceState {
   Subsurface surface;  ///< as it is where they have entered
   Vec3f N;             ///< shading normal there, world, outwards
   Maths maths;         ///< of the closure
+  bool front;          ///< they have entered on the triangle's front side
 };
 
 }  // namespace relief

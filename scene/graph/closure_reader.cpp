@@ -50,7 +50,8 @@ SurfaceClosureSpec read_closure(const JsonReader& r)
   static constexpr std::string_view kHairComponents[] = {"reflection", "transmission"};
   static constexpr std::string_view kPigments[] = {"color", "melanin", "absorption"};
   static constexpr std::string_view kFresnels[] = {"f82", "physical"};
-  static constexpr std::string_view kSubsurfaceMethods[] = {"random-walk", "random-walk-legacy", "random-walk-skin"};
+  static constexpr std::string_view kSubsurfaceMethods[] = {"random-walk", "random-walk-legacy", "random-walk-skin",
+                                                            "christensen-burley"};
   SurfaceClosureSpec spec;
   spec.maths = static_cast<Maths>(r.choice("maths", kMaths, 0));
   std::string type = r.string("type", "");

@@ -22,6 +22,10 @@ _PLAIN = "RANDOM_WALK_LEGACY" if IS_5_2 else "RANDOM_WALK" if IS_4_0 else "RANDO
 _SKIN = "RANDOM_WALK_SKIN" if IS_4_0 else "RANDOM_WALK"
 
 
+#: Files of before Blender 3.0 have it where nobody chose.
+_PROFILE = "BURLEY"
+
+
 def _stage(make_material, bounces=0, radius=0.5):
     """A ball beside a lamp: where it is lit, how far light comes round, and the floor that it lies on all show."""
     scene = new_scene()
@@ -142,3 +146,49 @@ def test_bumps_show_where_light_leaves():
     tree.links.new(noise.outputs["Fac"], bump.inputs["Height"])
     tree.links.new(bump.outputs["Normal"], wax.inputs["Normal"])
     assert_agrees(scene, samples=64)
+
+
+def test_a_ball_by_profiles():
+    """Larger than far, and as far as the ball is wide."""
+    for scale in (0.3, 2.0):
+        inputs = {"Color": (0.8, 0.6, 0.3, 1), "Radius": (1.0, 0.6, 0.3), "Scale": scale}
+        assert_agrees(_stage(lambda: _scattering(_PROFILE, **inputs)[0]), samples=64)
+
+
+def test_thin_dark_limbs_by_profiles():
+    """Light that walked at random would come through: red, where Cycles has dark brown."""
+    scene = new_scene()
+    color = (0.03, 0.006, 0.003, 1)
+    material = new_material("skin", "ShaderNodeBsdfPrincipled", Base_Color=color, Subsurface=0.33, Roughness=0.9)[0]
+    node = next(n for n in material.node_tree.nodes if n.bl_idname == "ShaderNodeBsdfPrincipled")
+    node.subsurface_method = _PROFILE
+    if IS_4_0:
+        node.inputs["Subsurface Scale"].default_value = 1.0
+    else:
+        node.inputs["Subsurface Color"].default_value = (0.09, 0.0125, 0.006, 1)
+    bpy.ops.mesh.primitive_cylinder_add(radius=0.1, depth=2, location=(0, 0, 0.5))
+    bpy.context.object.data.materials.append(material)
+    add_light("SUN", (0, 0, 3), degrees(50, 0, 30), energy=3)
+    set_world((0.5, 0.5, 0.5))
+    add_camera((0, -3, 0.5), degrees(90, 0, 0), lens=120)
+    assert_agrees(scene, samples=64)
+
+
+def test_profiles_at_edges_and_after_diffuse_light():
+    """What has scattered diffusely before meets a diffuse surface. At edges it matters along which tangents places are looked for."""
+    scene = _stage(lambda: _scattering(_PROFILE, Color=(0.8, 0.6, 0.3, 1), Radius=(1.0, 1.0, 0.0), Scale=0.5)[0], bounces=3)
+    bpy.data.objects["Sphere"].scale.x = -1
+    bpy.ops.mesh.primitive_cube_add(size=0.5, location=(0.8, 0, 0.3))
+    bpy.context.object.data.materials.append(bpy.data.materials["wax"])
+    assert_agrees(scene, samples=64)
+
+
+def test_walks_and_profiles_know_all_parts_of_an_object():
+    """One object of two materials: light that enters by one leaves by the other."""
+    for method in (_PLAIN, _PROFILE):
+        scene = _stage(lambda: _scattering(method, Color=(0.8, 0.6, 0.3, 1), Radius=(1.0, 1.0, 1.0), Scale=1.0)[0])
+        ball = bpy.data.objects["Sphere"]
+        ball.data.materials.append(diffuse((0.2, 0.3, 0.8)))
+        for face in ball.data.polygons:
+            face.material_index = int(face.center.x > 0.1)
+        assert_agrees(scene, samples=64)

@@ -87,16 +87,6 @@ def test_what_is_no_volume_is_told_once_a_material():
     _assert_warned_once(fill, 'material "fog"', "as volume", "nothing is there, as in Cycles")
 
 
-def test_subsurface_scattering_by_profiles_is_told_once_a_material():
-    def scatter(_):
-        skin, _, node = new_material("skin", "ShaderNodeSubsurfaceScattering")
-        node.falloff = "BURLEY"
-        for x in (-2, 2):
-            add_sphere(0.5, skin, (x, 0, 0.5))
-
-    _assert_warned_once(scatter, 'material "skin"', "Christensen-Burley", "at random")
-
-
 def test_light_probes_are_nothing():
     scene = _stage()
     bpy.ops.object.lightprobe_add(location=(0, 0, 3))

@@ -21,10 +21,8 @@ def _clumsy_scene(number=30):
         tree.links.new(odd.outputs["Color"], node.inputs["Color"])
         add_sphere(0.1, material, (index * 0.1, 0, 0), segments=4)
     material, tree, mix = new_material("both", "ShaderNodeAddShader")
-    for index, kind in enumerate(("ShaderNodeSubsurfaceScattering", "ShaderNodeEeveeSpecular")):
+    for index, kind in enumerate(("ShaderNodeVolumeScatter", "ShaderNodeEeveeSpecular")):
         node = tree.nodes.new(kind)
-        if hasattr(node, "falloff"):
-            node.falloff = "BURLEY"
         tree.links.new(node.outputs[0], mix.inputs[index])
     add_plane(2, material)
     return scene

@@ -94,6 +94,42 @@ double walked(double free_path, double single_albedo)
   return sum / kWalks;
 }
 
+/// The same by a profile: what it holds over the cube's faces, seen along the three axes of Cycles' probes, whose tangents lie across
+/// the diagonal (1, 1, -1) and so at 45 degrees to the four sides. Densities are of distances.
+double profiled(double free_path)
+{
+  constexpr int kPoints = 1000000;
+  std::mt19937_64 random(11);
+  std::uniform_real_distribution<double> u(0, 1);
+  const double end = 16 * free_path, whole = 1 - 0.25 * std::exp(-16.0) - 0.75 * std::exp(-16.0 / 3);
+  const auto density = [&](double r) {
+    return r < end ? (std::exp(-r / free_path) + std::exp(-r / (3 * free_path))) / (4 * free_path * whole) : 0.0;
+  };
+  double sum = 0;
+  for (int point = 0; point < kPoints; ++point) {
+    const std::array<double, 2> P{u(random) - 0.5, u(random) - 0.5};
+    const double r = end * u(random), phi = 2 * M_PI * u(random);
+    const double a = r * std::cos(phi), b = r * std::sin(phi);
+    // Straight down: the face itself, and the one below.
+    if (std::abs(P[0] + a) < 0.5 && std::abs(P[1] + b) < 0.5) sum += density(r) + density(std::sqrt(r * r + 1));
+    // Along both tangents: b is the depth, a the way across.
+    for (const double sign : {-1.0, 1.0}) {
+      const std::array<double, 2> along{std::sqrt(0.5), sign * std::sqrt(0.5)};
+      const std::array<double, 2> from{P[0] - along[1] * a, P[1] + along[0] * a};
+      if (b < 0 || b > 1) continue;
+      for (std::size_t i = 0; i < 2; ++i) {
+        for (const double side : {-0.5, 0.5}) {
+          const double t = (side - from[i]) / along[i];
+          if (std::abs(from[1 - i] + t * along[1 - i]) >= 0.5) continue;
+          // Half of each tangent's, over the cosine of 45 degrees.
+          sum += std::sqrt(0.5) * density(std::sqrt(t * t + r * r));
+        }
+      }
+    }
+  }
+  return sum / kPoints * end;
+}
+
 RenderOptions options_for(const Scene& scene)
 {
   RenderOptions options = render_options(scene, 16, 64);
@@ -121,6 +157,24 @@ TEST(Subsurface, WhatLeavesACubeIsWhatPlainWalksSay)
     // 5 standard errors, and those of the walks.
     EXPECT_NEAR(found.mean, expected, 5 * found.standard_error + 0.005 * expected) << channel;
     EXPECT_LT(found.standard_error, 0.01);
+  }
+}
+
+TEST(Subsurface, WhatLeavesACubeByAProfileIsWhatItsFacesHold)
+{
+  for (const double free_path : {0.02, 0.1, 0.3}) {
+    const double radius = free_path * 4 * M_PI;
+    const Scene scene = cube_of({{"type", "subsurface"},
+                                 {"method", "christensen-burley"},
+                                 {"color", {0.8, 0.5, 0.05}},
+                                 {"radius", {radius, 0, radius}}});
+    const double expected = profiled(free_path);
+    const Estimate red = estimate_mean(scene, options_for(scene), 8, 0);
+    EXPECT_NEAR(red.mean, 0.8 * expected, 5 * red.standard_error + 0.004 * expected) << free_path;
+    EXPECT_LT(red.standard_error, 0.01);
+    // Without a radius light leaves where it has entered.
+    const Estimate green = estimate_mean(scene, options_for(scene), 8, 1);
+    EXPECT_NEAR(green.mean, 0.5, 5 * green.standard_error + 1e-4) << free_path;
   }
 }
 
@@ -162,6 +216,7 @@ TEST(Subsurface, PathsKnowNoOtherObject)
   const Scene alone = cube_of(wax);
   Scene filled = cube_of(wax);
   Instance inner = filled.instances.front();
+  inner.object_index = -1;
   inner.world_from_object.x *= 0.5f;
   inner.world_from_object.y *= 0.5f;
   inner.world_from_object.z *= 0.5f;
@@ -178,6 +233,7 @@ TEST(Subsurface, PathsPassAnyNumberOfObjects)
   Scene filled = cube_of(wax);
   for (int i = 0; i < 60; ++i) {
     Instance inner = alone.instances.front();
+    inner.object_index = -1;
     const float scale = 0.9f - 0.01f * static_cast<float>(i);
     for (Vec3f* axis : {&inner.world_from_object.x, &inner.world_from_object.y, &inner.world_from_object.z})
       *axis *= scale;

@@ -576,17 +576,10 @@ def _toon(w, source, weight):
     w.add("toon", weight, **values, component=source.node.component.lower(), **_MATHS)
 
 
-def _subsurface_method(w, source, method):
-    """How light goes below a surface, by Blender's name of it."""
-    if method == "BURLEY":
-        w.unread(source, "Christensen-Burley subsurface scattering", "light walks at random as far, in its place")
-    return compat.SUBSURFACE_METHODS[method]
-
-
 def _subsurface(w, source, weight):
     names = ("Color", "Radius", "Scale", "Roughness", "Anisotropy", "Normal")
     values = w.inputs(source, {**{name: name.lower() for name in names}, "IOR": "ior"})
-    w.add("subsurface", weight, **values, method=_subsurface_method(w, source, source.node.falloff), **_MATHS)
+    w.add("subsurface", weight, **values, method=compat.SUBSURFACE_METHODS[source.node.falloff], **_MATHS)
 
 
 def _hair(w, source, weight):
@@ -683,7 +676,7 @@ def _principled(w, source, weight):
     values.update(w.anisotropy(source, {"Anisotropic": "anisotropic", "Anisotropic Rotation": "anisotropicRotation"}))
     if w.graph.constant(socket("Subsurface"), groups) != 0:
         values.update(w.inputs(source, compat.SUBSURFACE_INPUTS))
-        values["subsurfaceMethod"] = _subsurface_method(w, source, node.subsurface_method)
+        values["subsurfaceMethod"] = compat.SUBSURFACE_METHODS[node.subsurface_method]
     w.add("principled", weight, **values, distribution=_distribution(node), maths=compat.MATHS)
 
 

@@ -1,5 +1,6 @@
 // What is below a surface: the medium whose walks reflect what the surface is said to, and how paths enter.
 #include "kernel/bsdf/subsurface.h"
+#include "kernel/bsdf/subsurface_profile.h"
 
 #include <gtest/gtest.h>
 
@@ -88,6 +89,74 @@ TEST(Subsurface, FreePathsOfSkinAreInvertedDipoles)
     }
   }
   EXPECT_FLOAT_EQ(subsurface_free_path(2.0f, 0.0f, 1.4f), 2.0f * std::sqrt(3.0f));
+}
+
+/// Share of a profile's light up to a distance, by the trapezoid rule in double precision over Christensen's and Burley's sum of two
+/// exponentials.
+double profile_share(double free_path, double r)
+{
+  constexpr int kSteps = 20000;
+  double sum = 0;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double x = r * i / kSteps / free_path;
+    sum += (i == 0 || i == kSteps ? 0.5 : 1.0) * (std::exp(-x) + std::exp(-x / 3)) / (4 * free_path);
+  }
+  return sum * r / kSteps;
+}
+
+TEST(Profile, HoldsAllLightWithinItsEnd)
+{
+  const double whole = profile_share(1, static_cast<double>(kProfileEnd));
+  EXPECT_NEAR(static_cast<double>(kProfileShare), whole, 1e-7);
+  for (const float free_path : {1e-3f, 0.08f, 50.0f}) {
+    const double end = static_cast<double>(kProfileEnd * free_path);
+    double sum = 0;
+    constexpr int kSteps = 20000;
+    for (int i = 0; i < kSteps; ++i) {
+      sum += static_cast<double>(profile_pdf(free_path, static_cast<float>(end * (i + 0.5) / kSteps))) * end / kSteps;
+    }
+    EXPECT_NEAR(sum, 1, 1e-5) << free_path;
+    EXPECT_EQ(profile_pdf(free_path, kProfileEnd * free_path), 0.0f);
+  }
+}
+
+TEST(Profile, DistancesAreDistributedAsTheirDensitySays)
+{
+  const double whole = profile_share(1, static_cast<double>(kProfileEnd));
+  float last = -1;
+  for (const float u : {0.0f, 1e-6f, 0.01f, 0.3f, 0.5f, 0.9f, 0.99f, 0.9999f, 0x1.fffffep-1f}) {
+    const float r = profile_sample(u);
+    EXPECT_GT(r, last) << u;
+    EXPECT_LE(r, kProfileEnd);
+    // A rounded logarithm of y: 3 2⁻²⁴ in r, where the density is at most half, and the sum's own error.
+    EXPECT_NEAR(profile_share(1, static_cast<double>(r)) / whole, static_cast<double>(u), 3e-7) << u;
+    last = r;
+  }
+}
+
+/// On a plane, where distances along the disk are those from P, what all probes find together is all light; each only by the axis that
+/// can see it.
+TEST(Profile, APlaneLosesNothing)
+{
+  const Vec3f free_path{0.1f, 0.02f, 0};
+  const Vec3f N = normalize(Vec3f{1, 2, -0.5f}), P{3, -1, 2};
+  Vec3f sum;
+  constexpr int kSide = 256;
+  for (int i = 0; i < kSide * kSide; ++i) {
+    const Vec2f u{(static_cast<float>(i % kSide) + 0.5f) / kSide, (static_cast<float>(i / kSide) + 0.5f) / kSide};
+    const ProfileProbe probe = profile_probe_make(free_path, P, N, u);
+    EXPECT_NEAR(length(probe.D), 1, 1e-5f);
+    const float towards = dot(probe.D, N);
+    if (std::abs(towards) < 0.5f) continue;
+    const float t = dot(P - probe.O, N) / towards;
+    EXPECT_GE(t, 0.0f);
+    EXPECT_LE(t, probe.length * (1 + 1e-6f));
+    sum += profile_probe_gain(probe, free_path, length(probe.O + t * probe.D - P), N);
+  }
+  sum *= 1.0f / (kSide * kSide);
+  EXPECT_NEAR(sum.x, 1, 2e-3f);
+  EXPECT_NEAR(sum.y, 1, 2e-3f);
+  EXPECT_EQ(sum.z, 0.0f);
 }
 
 TEST(Subsurface, PathsEnterBelowTheSurface)
