@@ -401,12 +401,15 @@ VaryingMedia::Problem VaryingMedia::make_rates(const RatesOf& of,
                                                VaryingPlace& place,
                                                std::vector<RateBox>& all)
 {
-  const auto& [context, medium, instance, diagonal, size, num_levels] = of;
+  const SceneContext& context = of.context;
+  const VaryingMedium& medium = of.medium;
+  const std::int32_t instance = of.instance;
+  const float diagonal = of.diagonal;
   RateGrid& grid = place.rates;
-  grid.size = size;
-  grid.num_levels = num_levels;
+  grid.size = of.size;
+  grid.num_levels = of.num_levels;
   grid.low = box.low;
-  grid.cell = max((box.high - box.low) / static_cast<float>(size), splat3(1e-20f));
+  grid.cell = max((box.high - box.low) / static_cast<float>(grid.size), splat3(1e-20f));
   const std::size_t side = static_cast<std::size_t>(grid.size), level_size = side * side * side;
   all.assign(level_size * static_cast<std::size_t>(grid.num_levels), {});
   const GraphBoundsRun run_bounds = graph_bounds_select();
