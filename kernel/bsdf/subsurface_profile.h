@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cmath>
+#include <initializer_list>
 
 #include "kernel/math/trigonometry.h"
 #include "kernel/math/vec.h"
