@@ -111,6 +111,14 @@ function(relief_add_library name)
   cmake_language(EVAL CODE "cmake_language(DEFER CALL relief_group_sources ${name})")
 endfunction()
 
+# relief_end_tbb(TARGET): if the address sanitizer looks for leaks when TARGET's program ends, no worker of TBB is left by then.
+function(relief_end_tbb target)
+  if(RELIEF_SANITIZE MATCHES "address")
+    target_sources(${target} PRIVATE "${PROJECT_SOURCE_DIR}/tests/support/tbb_at_exit.cpp")
+    target_link_libraries(${target} PRIVATE TBB::tbb)
+  endif()
+endfunction()
+
 # relief_add_tests(NAME [WHOLE] LABELS l... LIBRARIES t... SOURCES s...): one GoogleTest executable, each TEST a CTest test.
 # WHOLE: all of them are one, for programs that take longer to load their libraries than for most of their tests.
 # Compiled with relief_test_options besides the project's own.
@@ -118,6 +126,7 @@ function(relief_add_tests name)
   cmake_parse_arguments(arg "WHOLE" "" "LABELS;LIBRARIES;SOURCES" ${ARGN})
   add_executable(${name} ${arg_SOURCES})
   target_link_libraries(${name} PRIVATE ${arg_LIBRARIES} GTest::gtest_main)
+  relief_end_tbb(${name})
   target_compile_options(${name} PRIVATE ${relief_test_options})
   cmake_language(EVAL CODE "cmake_language(DEFER CALL relief_group_sources ${name})")
   if(arg_WHOLE)
