@@ -87,13 +87,15 @@ void exr_rows_write(Output& output,
                    [&](const ChannelView& channel) { return exr_colors_of(channel, channels); });
   }
   const std::size_t width = static_cast<std::size_t>(windows.width);
+  // A picture may have fewer rows, and channels by the dozen.
+  const int rows_at_once = std::min(kRowsAtOnce, windows.height);
   std::vector<std::vector<char>> packed;
   packed.reserve(channels.size());
   for (const ChannelView& channel : channels) {
-    packed.emplace_back(width * kRowsAtOnce * exr_value_bytes(channel.type));
+    packed.emplace_back(width * static_cast<std::size_t>(rows_at_once) * exr_value_bytes(channel.type));
   }
-  for (int y0 = 0; y0 < windows.height; y0 += kRowsAtOnce) {
-    const int num_rows = std::min(kRowsAtOnce, windows.height - y0);
+  for (int y0 = 0; y0 < windows.height; y0 += rows_at_once) {
+    const int num_rows = std::min(rows_at_once, windows.height - y0);
     Imf::FrameBuffer buffer;
     for (std::size_t c = 0; c < channels.size(); ++c) {
       const std::size_t pixel_bytes = exr_value_bytes(channels[c].type), row_bytes = pixel_bytes * width;
