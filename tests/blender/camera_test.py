@@ -26,7 +26,7 @@ def _stage(width, height, location=(2, -5, 4), rotation=(55, 0, 22), **settings)
     add_plane(6, diffuse((0, 0, 0)))
     for x in range(-2, 3):
         for y in range(-2, 3):
-            add_sphere(0.25 + 0.04 * x, glow, (x, y, 0.3))
+            add_sphere(0.25 + 0.04 * x, glow, (x, y, 0.3), segments=16)
     camera = add_camera(location, degrees(*rotation), **settings)
     return scene, camera
 
@@ -98,14 +98,14 @@ def _focus(camera, fstop):
 def test_depth_of_field():
     scene, camera = _stage(64, 40, lens=50)
     _focus(camera, 0.08)
-    assert_agrees(scene, block=4, samples=128)
+    assert_agrees(scene, block=4, samples=32)
 
 
 def test_depth_of_field_on_an_object():
     scene, camera = _stage(64, 40, lens=50)
     _focus(camera, 0.08)
     camera.data.dof.focus_object = next(o for o in scene.objects if o.location.y == 1 and o.location.x == 1)
-    assert_agrees(scene, block=4, samples=128)
+    assert_agrees(scene, block=4, samples=32)
 
 
 def test_depth_of_field_on_a_bone():
@@ -118,13 +118,13 @@ def test_depth_of_field_on_a_bone():
     bone.head, bone.tail = (0, -4, 0), (0, -4, 1)
     bpy.ops.object.mode_set(mode="OBJECT")
     camera.data.dof.focus_object, camera.data.dof.focus_subtarget = armature, "far"
-    assert_agrees(scene, block=4, samples=128)
+    assert_agrees(scene, block=4, samples=32)
 
 
 def test_depth_of_field_orthographic():
     scene, camera = _stage(64, 40, type="ORTHO", ortho_scale=5)
     _focus(camera, 2.0)
-    assert_agrees(scene, block=4, samples=128)
+    assert_agrees(scene, block=4, samples=32)
 
 
 def _eyes(scene, engine):

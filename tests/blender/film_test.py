@@ -65,14 +65,14 @@ def test_collection_holdout():
     """A hole in the picture, which still casts its shadow and colours its surroundings."""
     scene, collection = _stage()
     collection.holdout = True
-    assert_agrees(scene, samples=64)
+    assert_agrees(scene, samples=16)
     _assert_same_alpha(scene)
 
 
 def test_object_holdout():
     scene, _ = _stage()
     next(o for o in scene.objects if o.name.startswith("Sphere")).is_holdout = True
-    assert_agrees(scene, samples=64)
+    assert_agrees(scene, samples=16)
 
 
 def test_holdouts_of_materials():
@@ -84,7 +84,7 @@ def test_holdouts_of_materials():
         tree.links.new(shown.outputs[0], node.inputs[1])
         tree.links.new(held.outputs[0], node.inputs[2])
         collection.collection.objects[0].data.materials[0] = material
-        assert_agrees(scene, samples=64)
+        assert_agrees(scene, samples=16)
         for is_transparent in (False, True):
             scene.render.film_transparent = is_transparent
             relief, cycles = _alpha(scene, "RELIEF"), _alpha(scene, "CYCLES")
@@ -94,7 +94,7 @@ def test_holdouts_of_materials():
 def test_collection_indirect_only():
     scene, collection = _stage()
     collection.indirect_only = True
-    assert_agrees(scene, samples=64)
+    assert_agrees(scene, samples=16)
 
 
 def test_an_instance_is_held_out_with_what_makes_it():
@@ -109,7 +109,7 @@ def test_an_instance_is_held_out_with_what_makes_it():
         empty.location = (place, 0, 0)
         owner.objects.link(empty)
     scene.view_layers[0].layer_collection.children["held"].holdout = True
-    assert_agrees(scene, samples=64)
+    assert_agrees(scene, samples=16)
 
 
 def test_material_override():
@@ -117,7 +117,7 @@ def test_material_override():
     scene, _ = _stage()
     bpy.ops.mesh.primitive_cube_add(size=0.6, location=(-1.5, 0, 0.3))
     scene.view_layers[0].material_override = diffuse((0.9, 0.2, 0.6), "override")
-    assert_agrees(scene, samples=64)
+    assert_agrees(scene, samples=16)
 
 
 def _glass_stage(roughness, threshold):
@@ -142,9 +142,10 @@ def _glass_stage(roughness, threshold):
 
 def test_transparent_glass():
     """Glass up to a roughness is as clear as the film behind it, rougher glass is not, and filters are by their colour."""
-    for roughness, threshold in ((0.2, 0.3), (0.3, 0.1)):
+    # The first is the darker, and so the noisier one.
+    for roughness, threshold, samples in ((0.2, 0.3, 640), (0.3, 0.1, 160)):
         scene = _glass_stage(roughness, threshold)
-        assert_agrees(scene, samples=640, least_mean=0.005, tolerance=0.03)
+        assert_agrees(scene, samples=samples, least_mean=0.005, tolerance=0.03)
         relief, cycles = _alpha(scene, "RELIEF"), _alpha(scene, "CYCLES")
         assert abs(relief.mean() - cycles.mean()) < 0.004, (relief.mean(), cycles.mean())
         blocks = [a[:48, :64].reshape(6, 8, 8, 8).mean(axis=(1, 3)) for a in (relief, cycles)]
@@ -171,13 +172,13 @@ def test_holdouts_are_black():
     hole = channels["A"] == 0
     assert hole.any()
     assert max(channels[c][hole].max() for c in "RGB") == 0
-    assert_agrees(scene, samples=64)
+    assert_agrees(scene, samples=16)
 
 
 def test_film_exposure():
     scene, _ = _stage()
     scene.cycles.film_exposure = 2.5
-    assert_agrees(scene, samples=64)
+    assert_agrees(scene, samples=16)
 
 
 def test_film_exposure_of_passes():

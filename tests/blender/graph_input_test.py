@@ -572,7 +572,7 @@ def _beveled_scene(samples, radius=0.3):
 
 def test_bevel():
     scene, _ = _beveled_scene(8)
-    assert_agrees(scene, samples=32)
+    assert_agrees(scene, samples=16)
 
 
 def test_bevel_of_few_rays_over_a_bump():
@@ -583,7 +583,7 @@ def test_bevel_of_few_rays_over_a_bump():
     noise.inputs["Scale"].default_value = 2
     tree.links.new(noise.outputs["Fac"], bump.inputs["Height"])
     tree.links.new(bump.outputs[0], bevel.inputs["Normal"])
-    assert_agrees(scene, samples=32)
+    assert_agrees(scene, samples=16)
 
 
 def test_bevel_of_metal():
@@ -601,7 +601,7 @@ def test_bevel_of_metal():
     bpy.context.object.data.materials.append(diffuse())
     set_world((0.6, 0.7, 1.0))
     set_bounces(scene, 3)
-    assert_agrees(scene, samples=64)
+    assert_agrees(scene, samples=16)
 
 
 def test_what_is_there_of_hair_and_points():
@@ -687,14 +687,14 @@ def test_shadow_rays_under_an_even_world():
 
 def test_shadow_rays():
     """What only shadow rays do not see casts no shadow."""
-    assert_agrees(_transparent_by("Is Shadow Ray", 0.8), runs=4, samples=64)
+    assert_agrees(_transparent_by("Is Shadow Ray", 0.8), runs=4, samples=16)
 
 
 def test_lengths_and_depths_of_shadow_rays():
-    assert_agrees(_transparent_by("Ray Length", 0.1), runs=4, samples=64)
-    assert_agrees(_transparent_by("Ray Depth", 0.3), runs=4, samples=64)
+    assert_agrees(_transparent_by("Ray Length", 0.1), runs=4, samples=16)
+    assert_agrees(_transparent_by("Ray Depth", 0.3), runs=4, samples=16)
 
 
 def test_depths_of_diffuse_rays():
-    assert_agrees(_transparent_by("Diffuse Depth", 0.5), runs=4, samples=64)
-    assert_agrees(_transparent_by("Is Diffuse Ray", 0.8), runs=4, samples=64)
+    assert_agrees(_transparent_by("Diffuse Depth", 0.5), runs=4, samples=16)
+    assert_agrees(_transparent_by("Is Diffuse Ray", 0.8), runs=4, samples=16)

@@ -738,7 +738,7 @@ def _procedural_scene():
 
 
 def test_a_procedural_scene():
-    assert_agrees(_procedural_scene(), runs=4, samples=64)
+    assert_agrees(_procedural_scene(), runs=4, samples=16)
 
 
 def test_it_is_bent_with_its_object():
@@ -750,7 +750,7 @@ def test_it_is_bent_with_its_object():
     point = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeTexCoord")
     mapping = next(node for node in tree.nodes if node.bl_idname == "ShaderNodeMapping")
     tree.links.new(point.outputs["Generated"], mapping.inputs["Vector"])
-    assert_agrees(scene, runs=4, samples=64)
+    assert_agrees(scene, runs=4, samples=16)
 
 
 def test_opacity_by_noise():
@@ -766,7 +766,7 @@ def test_opacity_by_noise():
     tree.links.new(clear.outputs[0], mix.inputs[1])
     tree.links.new(surface.outputs[0], mix.inputs[2])
     tree.links.new(mix.outputs[0], output.inputs["Surface"])
-    assert_agrees(scene, runs=4, samples=64)
+    assert_agrees(scene, runs=4, samples=16)
 
 
 def test_what_is_behind_a_ramp_is_named():

@@ -47,13 +47,13 @@ def _grow(material, count=300, length=0.5, shape="THICK", **settings):
 def test_tubes():
     scene = _stage()
     _grow(diffuse((0.7, 0.4, 0.2)))
-    assert_agrees(scene, samples=64)
+    assert_agrees(scene, samples=16)
 
 
 def test_ribbons():
     scene = _stage()
     _grow(diffuse((0.7, 0.4, 0.2)), shape="RIBBONS", count=1000, radius_scale=0.02)
-    assert_agrees(scene, samples=64)
+    assert_agrees(scene, samples=16)
 
 
 def test_principled_ribbons():
@@ -61,7 +61,7 @@ def test_principled_ribbons():
     scene = _stage()
     material, _, node = new_material("fur", "ShaderNodeBsdfPrincipled", **{"Base Color": (0.8, 0.8, 0.8, 1), "Roughness": 0.5})
     _grow(material, shape="RIBBONS", count=6000, radius_scale=0.02)
-    assert_agrees(scene, samples=96)
+    assert_agrees(scene, samples=48)
 
 
 def test_children_of_a_hidden_emitter():
@@ -75,7 +75,7 @@ def test_children_of_a_hidden_emitter():
         kink_amplitude=0.05,
     )
     ball.show_instancer_for_render = False
-    assert_agrees(scene, samples=64)
+    assert_agrees(scene, samples=16)
 
 
 def test_maps_at_the_root_and_curves_info():
@@ -91,7 +91,7 @@ def test_maps_at_the_root_and_curves_info():
     tree.links.new(info.outputs["Random"], mix.inputs["Color2"])
     tree.links.new(mix.outputs["Color"], node.inputs["Color"])
     _grow(material)
-    assert_agrees(scene, samples=64)
+    assert_agrees(scene, samples=16)
 
 
 def test_tangent_normal_length_thickness():

@@ -103,7 +103,7 @@ def test_point_by_black_body():
         body.inputs[0].default_value = 2700
         nodes.color(body.outputs[0])
 
-    assert_agrees(_stage(light), samples=64)
+    assert_agrees(_stage(light), samples=16)
 
 
 def _falloff(output, smooth):
@@ -118,15 +118,15 @@ def _falloff(output, smooth):
 
 
 def test_linear_falloff():
-    assert_agrees(_falloff("Linear", 0.0), samples=64)
+    assert_agrees(_falloff("Linear", 0.0), samples=16)
 
 
 def test_constant_falloff_with_smooth():
-    assert_agrees(_falloff("Constant", 3.0), samples=64)
+    assert_agrees(_falloff("Constant", 3.0), samples=16)
 
 
 def test_quadratic_falloff_with_smooth():
-    assert_agrees(_falloff("Quadratic", 5.0), samples=64)
+    assert_agrees(_falloff("Quadratic", 5.0), samples=16)
 
 
 def _add_area(**options):
@@ -139,7 +139,7 @@ def test_area_by_parametric():
         nodes = _Nodes(_add_area())
         nodes.color(nodes.checker(nodes.new("NewGeometry").outputs["Parametric"], 3.0))
 
-    assert_agrees(_stage(light), samples=128)
+    assert_agrees(_stage(light), samples=32)
 
 
 def test_area_by_an_image():
@@ -149,7 +149,7 @@ def test_area_by_an_image():
         nodes.link(nodes.new("NewGeometry").outputs["Parametric"], image.inputs["Vector"])
         nodes.color(image.outputs["Color"])
 
-    assert_agrees(_stage(light), samples=128)
+    assert_agrees(_stage(light), samples=32)
 
 
 def test_area_by_an_image_in_a_mirror():
@@ -165,7 +165,7 @@ def test_area_by_an_image_in_a_mirror():
     nodes.color(image.outputs["Color"])
     add_camera((0, 0, 4), lens=50)
     set_bounces(scene, 1)
-    assert_agrees(scene, samples=64, block=4)
+    assert_agrees(scene, samples=16, block=4)
 
 
 def test_area_by_uv():
@@ -175,7 +175,7 @@ def test_area_by_uv():
         nodes = _Nodes(_add_area(shape="ELLIPSE"))
         nodes.color(nodes.new("TexImage", image=_image()).outputs["Color"])
 
-    assert_agrees(_stage(light), samples=128)
+    assert_agrees(_stage(light), samples=32)
 
 
 def test_area_by_position_and_direction():
@@ -187,7 +187,7 @@ def test_area_by_position_and_direction():
         nodes.link(coordinates.outputs["Object"], add.inputs[1])
         nodes.color(nodes.checker(add.outputs[0], 2.0))
 
-    assert_agrees(_stage(light), samples=128)
+    assert_agrees(_stage(light), samples=32)
 
 
 def _gobo(radius, output="Normal"):
@@ -200,11 +200,11 @@ def _gobo(radius, output="Normal"):
 
 
 def test_gobo_by_normal():
-    assert_agrees(_gobo(0.0), samples=64)
+    assert_agrees(_gobo(0.0), samples=16)
 
 
 def test_gobo_by_generated():
-    assert_agrees(_gobo(0.0, "Generated"), samples=64)
+    assert_agrees(_gobo(0.0, "Generated"), samples=16)
 
 
 def test_gobo_projected_by_the_cone():
@@ -222,7 +222,7 @@ def test_gobo_projected_by_the_cone():
         nodes.link(vector.outputs[0], image.inputs["Vector"])
         nodes.color(image.outputs["Color"])
 
-    assert_agrees(_stage(light), samples=64)
+    assert_agrees(_stage(light), samples=16)
 
 
 def test_spot_and_point_by_their_uv():
@@ -237,7 +237,7 @@ def test_spot_and_point_by_their_uv():
             nodes.link(nodes.new("TexCoord").outputs["UV"], image.inputs["Vector"])
             nodes.color(image.outputs["Color"])
 
-    assert_agrees(_stage(light), samples=64)
+    assert_agrees(_stage(light), samples=16)
 
 
 def test_point_with_radius_by_normal():
@@ -245,7 +245,7 @@ def test_point_with_radius_by_normal():
         nodes = _Nodes(add_light("POINT", (0.8, -0.6, 1.8), degrees(0, 0, 0), energy=100, shadow_soft_size=0.4))
         nodes.color(nodes.checker(nodes.new("NewGeometry").outputs["Normal"], 2.0))
 
-    assert_agrees(_stage(light), samples=256)
+    assert_agrees(_stage(light), samples=64)
 
 
 def test_sun_by_direction():
@@ -259,7 +259,7 @@ def test_sun_by_direction():
         nodes.color(absolute.outputs[0])
         nodes.strength(nodes.new("LightFalloff").outputs["Quadratic"])
 
-    assert_agrees(_stage(light), samples=128)
+    assert_agrees(_stage(light), samples=32)
 
 
 def test_object_info_of_lights():
@@ -276,7 +276,7 @@ def test_object_info_of_lights():
     if bpy.app.version >= (5, 0, 0):
         assert_warns(_stage(light), "Location of a light")
     else:
-        assert_agrees(_stage(light), samples=64)
+        assert_agrees(_stage(light), samples=16)
 
 
 def _mixed_by(output):
@@ -299,7 +299,7 @@ def _mixed_by(output):
 
 def test_camera_rays_are_of_no_kind():
     """As in Cycles, which asks lights without saying who asks."""
-    assert_agrees(_mixed_by("Is Camera Ray"), samples=128, block=4)
+    assert_agrees(_mixed_by("Is Camera Ray"), samples=32, block=4)
 
 
 def test_depths():
@@ -317,7 +317,7 @@ def test_depths():
     scene.relief.strict = False
     next(o for o in scene.objects if o.type == "LIGHT").data.cycles.use_multiple_importance_sampling = False
     set_bounces(scene, 1)
-    assert_agrees(scene, samples=256, block=8)
+    assert_agrees(scene, samples=64, block=8)
 
 
 def test_sum_of_emissions():
@@ -330,7 +330,7 @@ def test_sum_of_emissions():
         nodes.link(other.outputs[0], add.inputs[1])
         nodes.link(add.outputs[0], nodes.output.inputs["Surface"])
 
-    assert_agrees(_stage(light), samples=128)
+    assert_agrees(_stage(light), samples=32)
 
 
 #: Angles of a profile that is the same nowhere.
@@ -381,11 +381,11 @@ def _set_text(text):
 
 
 def test_ies_text():
-    assert_agrees(_ies_scene(_set_text(_ies())), samples=64)
+    assert_agrees(_ies_scene(_set_text(_ies())), samples=16)
 
 
 def test_ies_of_a_spot():
-    assert_agrees(_ies_scene(_set_text(_ies()), kind="SPOT"), samples=64)
+    assert_agrees(_ies_scene(_set_text(_ies()), kind="SPOT"), samples=16)
 
 
 def test_ies_file_of_a_quadrant():
@@ -397,16 +397,16 @@ def test_ies_file_of_a_quadrant():
         def make(node):
             node.mode, node.filepath = "EXTERNAL", name
 
-        assert_agrees(_ies_scene(make), samples=64)
+        assert_agrees(_ies_scene(make), samples=16)
 
 
 def test_ies_of_one_plane():
-    assert_agrees(_ies_scene(_set_text(_ies(horizontal=[0]))), samples=64)
+    assert_agrees(_ies_scene(_set_text(_ies(horizontal=[0]))), samples=16)
 
 
 def test_ies_to_the_side_alone():
     """Nothing above 90°."""
-    assert_agrees(_ies_scene(_set_text(_ies(vertical=[0, 10, 25, 40, 55, 70, 80, 90]))), samples=64)
+    assert_agrees(_ies_scene(_set_text(_ies(vertical=[0, 10, 25, 40, 55, 70, 80, 90]))), samples=16)
 
 
 def test_ies_of_types_a_and_b():
@@ -424,7 +424,7 @@ def test_ies_by_a_vector():
         geometry = tree.nodes.new("ShaderNodeNewGeometry")
         tree.links.new(geometry.outputs["Incoming"], node.inputs["Vector"])
 
-    assert_agrees(_ies_scene(make), samples=64)
+    assert_agrees(_ies_scene(make), samples=16)
 
 
 def test_missing_ies_file():

@@ -60,33 +60,33 @@ _GLOW = ("ShaderNodeEmission", {"Color": (0.2, 1, 0.3, 1), "Strength": 1.5})
 
 
 def test_diffuse():
-    assert_agrees(_stage(diffuse((0.2, 0.7, 0.4))), samples=32)
+    assert_agrees(_stage(diffuse((0.2, 0.7, 0.4))), samples=16)
 
 
 def test_principled_without_specular():
     values = {"Base_Color": (0.2, 0.7, 0.4, 1), "Specular": 0.0}
     material, _, node = new_material("principled", "ShaderNodeBsdfPrincipled", **values)
     node.inputs["Roughness"].default_value = 0.5
-    assert_agrees(_stage(material), samples=32)
+    assert_agrees(_stage(material), samples=16)
 
 
 def test_principled_metal():
     material = new_material(
         "metal", "ShaderNodeBsdfPrincipled", Base_Color=(0.9, 0.6, 0.2, 1), Metallic=1.0, Roughness=0.2
     )[0]
-    assert_agrees(_stage(material), samples=64)
+    assert_agrees(_stage(material), samples=16)
 
 
 def test_principled_plastic():
     material = new_material("plastic", "ShaderNodeBsdfPrincipled", Base_Color=(0.5, 0.1, 0.1, 1), Roughness=0.3)[0]
-    assert_agrees(_stage(material), samples=32)
+    assert_agrees(_stage(material), samples=16)
 
 
 def test_mirror():
     material, _, node = new_material("mirror", "ShaderNodeBsdfGlossy", Color=(0.9, 0.9, 0.9, 1))
     make_sharp(node)
     # glTF's metals reflect all light at grazing angles, Cycles' glossy node its colour at all of them.
-    assert_agrees(_stage(material), samples=64)
+    assert_agrees(_stage(material), samples=16)
 
 
 def test_white_mirror_long():
@@ -101,7 +101,7 @@ def test_smooth_glass():
     scene = _stage(material, 8)
     # Caustics of the lamp would never settle; the sky's do.
     bpy.data.objects.remove(next(o for o in scene.objects if o.type == "LIGHT"))
-    assert_agrees(scene, samples=64)
+    assert_agrees(scene, samples=16)
 
 
 def test_absorbing_glass():
@@ -114,7 +114,7 @@ def test_absorbing_glass():
     tree.links.new(volume.outputs[0], output.inputs["Volume"])
     scene = _stage(material, 8)
     bpy.data.objects.remove(next(o for o in scene.objects if o.type == "LIGHT"))
-    assert_agrees(scene, samples=64)
+    assert_agrees(scene, samples=16)
 
 
 def _absorbing_ball(radius, location=(0, 0, 0), color=(0.2, 0.6, 0.9, 1)):
@@ -139,7 +139,7 @@ def test_a_camera_in_what_absorbs():
         add_camera((0, -0.2, 0), (1.4, 0, -0.3), lens=20).data.type = "ORTHO" if is_orthographic else "PERSP"
         scene.camera.data.ortho_scale = 3
         set_bounces(scene, 4)
-        assert_agrees(scene, samples=64)
+        assert_agrees(scene, samples=16)
 
 
 def test_a_lamp_in_what_absorbs():
@@ -149,7 +149,7 @@ def test_a_lamp_in_what_absorbs():
     add_light("AREA", (0.2, 0.1, 0.6), energy=20, size=0.5)
     add_camera((0, -1.2, 0.3), degrees(65, 0, 0), lens=30)
     set_bounces(scene, 4)
-    assert_agrees(scene, samples=128)
+    assert_agrees(scene, samples=32)
 
 
 def test_absorbing_things_in_each_other_add_up():
@@ -162,7 +162,7 @@ def test_absorbing_things_in_each_other_add_up():
         add_camera(camera, degrees(90, 0, 0), lens=40)
         set_world((1, 1, 1))
         set_bounces(scene, 8)
-        assert_agrees(scene, samples=64)
+        assert_agrees(scene, samples=16)
 
 
 def test_emission_that_takes_light_away():
@@ -181,20 +181,20 @@ def test_emission_that_takes_light_away():
     add_sphere(0.3, value, location=(0, -1, 0.3))
     add_camera((0, -5, 2.5), degrees(65, 0, 0), lens=35)
     set_world((1, 1, 1))
-    assert_agrees(scene, samples=64)
+    assert_agrees(scene, samples=16)
 
 
 def test_emission():
     glow = new_material("glow", "ShaderNodeEmission", Color=(1, 0.4, 0.1, 1), Strength=2.5)[0]
-    assert_agrees(_stage(glow), samples=64)
+    assert_agrees(_stage(glow), samples=16)
 
 
 def test_transparency():
-    assert_agrees(_stage(_mixed("ShaderNodeMixShader", _CLEAR, _RED, 0.4)), samples=64)
+    assert_agrees(_stage(_mixed("ShaderNodeMixShader", _CLEAR, _RED, 0.4)), samples=16)
 
 
 def test_transparency_second():
-    assert_agrees(_stage(_mixed("ShaderNodeMixShader", _RED, _CLEAR, 0.4)), samples=64)
+    assert_agrees(_stage(_mixed("ShaderNodeMixShader", _RED, _CLEAR, 0.4)), samples=16)
 
 
 def test_mix_of_diffuse_shaders():
@@ -202,7 +202,7 @@ def test_mix_of_diffuse_shaders():
 
 
 def test_diffuse_plus_emission():
-    assert_agrees(_stage(_mixed("ShaderNodeAddShader", _RED, _GLOW)), samples=64)
+    assert_agrees(_stage(_mixed("ShaderNodeAddShader", _RED, _GLOW)), samples=16)
 
 
 def test_node_group():
@@ -221,7 +221,7 @@ def test_node_group():
     node.inputs["Paint"].default_value = (0.1, 0.8, 0.5, 1)
     output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
     tree.links.new(node.outputs[0], output.inputs["Surface"])
-    assert_agrees(_stage(material), samples=32)
+    assert_agrees(_stage(material), samples=16)
 
 
 def test_material_without_nodes():
@@ -256,4 +256,4 @@ def test_a_volume_behind_an_opaque_surface_is_not_seen():
     volume = tree.nodes.new("ShaderNodeVolumePrincipled")
     output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
     tree.links.new(volume.outputs[0], output.inputs["Volume"])
-    assert_agrees(_stage(material), samples=64)
+    assert_agrees(_stage(material), samples=16)

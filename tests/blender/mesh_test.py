@@ -197,7 +197,7 @@ def _seen_by_some(ray, shines):
 def test_objects_that_some_rays_do_not_see():
     for ray in ("diffuse", "glossy", "transmission"):
         for shines in (False, True):
-            assert_agrees(_seen_by_some(ray, shines), samples=64)
+            assert_agrees(_seen_by_some(ray, shines), samples=32)
 
 
 def test_render_visibility():
@@ -219,7 +219,7 @@ def test_indirect_light():
     add_sphere(0.7, location=(0.3, 0.4, -1))
     add_light("AREA", (0, 0, 1.9), energy=100, size=1.0)
     add_camera((0, -1.9, 0), degrees(90, 0, 0), lens=20)
-    assert_agrees(scene, samples=64)
+    assert_agrees(scene, samples=16)
 
 
 def test_equal_corners_are_joined_and_no_others():

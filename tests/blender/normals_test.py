@@ -318,7 +318,7 @@ def test_clearcoat_under_a_lamp():
         add_plane(8, material)
         add_light("AREA", (0, 2, 3), degrees(-30, 0, 0), energy=300, size=2)
         add_camera((0, -4, 3), degrees(60, 0, 0))
-        assert_agrees(scene, samples=64, tolerance=0.01)
+        assert_agrees(scene, samples=16, tolerance=0.01)
         _clear()
 
 

@@ -57,7 +57,7 @@ def _skin(method, **inputs):
 
 def test_a_ball_of_wax():
     inputs = {"Color": (0.8, 0.6, 0.3, 1), "Radius": (1.0, 0.6, 0.3), "Scale": 1.0}
-    assert_agrees(_stage(lambda: _scattering(_PLAIN, **inputs)[0]), samples=64)
+    assert_agrees(_stage(lambda: _scattering(_PLAIN, **inputs)[0]), samples=32)
 
 
 def test_free_paths_as_they_are():
@@ -69,12 +69,12 @@ def test_free_paths_as_they_are():
 
 def test_skin_goes_by_its_albedo():
     inputs = {"Color": (0.9, 0.5, 0.2, 1), "Radius": (0.3, 0.2, 0.1), "Scale": 0.5, "IOR": 1.5}
-    assert_agrees(_stage(lambda: _scattering(_SKIN, **inputs)[0]), samples=64)
+    assert_agrees(_stage(lambda: _scattering(_SKIN, **inputs)[0]), samples=32)
 
 
 def test_forward_scattering():
     inputs = {"Color": (0.8, 0.8, 0.8, 1), "Radius": (0.2, 0.1, 0.05), "Anisotropy": 0.8, "Scale": 1.0}
-    assert_agrees(_stage(lambda: _scattering(_SKIN, **inputs)[0]), samples=64)
+    assert_agrees(_stage(lambda: _scattering(_SKIN, **inputs)[0]), samples=32)
 
 
 def test_principled():
@@ -85,12 +85,12 @@ def test_principled():
 def test_principled_skin_by_the_sky():
     scene = _stage(lambda: _skin(_SKIN, Subsurface=0.3, Specular=0.8, Roughness=0.3), bounces=3)
     set_world((0.6, 0.7, 0.9))
-    assert_agrees(scene, samples=64)
+    assert_agrees(scene, samples=16)
 
 
 def test_channels_without_radius_are_diffuse():
     inputs = {"Color": (0.7, 0.7, 0.7, 1), "Radius": (1.0, 0.0, 0.2), "Scale": 1.0}
-    assert_agrees(_stage(lambda: _scattering(_PLAIN, **inputs)[0]), samples=64)
+    assert_agrees(_stage(lambda: _scattering(_PLAIN, **inputs)[0]), samples=32)
 
 
 def test_thin_sheets_let_light_through():
@@ -123,7 +123,7 @@ def test_mixed_with_gloss_and_seen_in_a_mirror():
     mirror = new_material("mirror", "ShaderNodeBsdfGlossy", Color=(1, 1, 1, 1), Roughness=0.3)[0]
     bpy.ops.mesh.primitive_plane_add(size=4, location=(0, 1.2, 1), rotation=degrees(90, 0, 0))
     bpy.context.object.data.materials.append(mirror)
-    assert_agrees(scene, samples=64)
+    assert_agrees(scene, samples=32)
 
 
 def test_neighbours_are_passed():
@@ -171,7 +171,7 @@ def test_thin_dark_limbs_by_profiles():
     add_light("SUN", (0, 0, 3), degrees(50, 0, 30), energy=3)
     set_world((0.5, 0.5, 0.5))
     add_camera((0, -3, 0.5), degrees(90, 0, 0), lens=120)
-    assert_agrees(scene, samples=64)
+    assert_agrees(scene, samples=16)
 
 
 def test_profiles_at_edges_and_after_diffuse_light():

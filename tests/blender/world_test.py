@@ -66,7 +66,7 @@ def test_coordinates_of_the_camera():
         tree.links.new(coordinate.outputs[name], mapping.inputs["Vector"])
         tree.links.new(mapping.outputs["Vector"], gradient.inputs["Vector"])
         tree.links.new(gradient.outputs["Color"], tree.nodes["Background"].inputs["Color"])
-        assert_agrees(scene, samples=64)
+        assert_agrees(scene, samples=16)
 
 
 def test_color_without_nodes():
@@ -205,7 +205,7 @@ def _hidden_from(*rays):
 
 
 def test_a_world_hidden_from_the_camera():
-    assert_agrees(_hidden_from("camera"), samples=128, tolerance=_FACETS)
+    assert_agrees(_hidden_from("camera"), samples=32, tolerance=_FACETS)
 
 
 def test_a_world_hidden_from_diffuse_rays_long():
@@ -250,7 +250,7 @@ def test_directions():
         mapping.inputs["Location"].default_value = (0.6, 0.6, 0.6)
         tree.links.new(source.outputs[output], mapping.inputs["Vector"])
         tree.links.new(mapping.outputs["Vector"], tree.nodes["Background"].inputs["Color"])
-        assert_agrees(scene, samples=64, block=4)
+        assert_agrees(scene, samples=16, block=4)
 
 
 def test_clouds_long():
@@ -376,7 +376,7 @@ def test_sky_at_dusk():
     """The sun's disk is in it, a hand's breadth above the horizon, where the camera does not look."""
     scene = _stage()
     _sky_world(0.2, sun_elevation=math.radians(6), sun_rotation=math.radians(120), sun_size=math.radians(2))
-    assert_agrees(scene, samples=256, block=4, dark=_RIM)
+    assert_agrees(scene, samples=64, block=4, dark=_RIM)
 
 
 def test_sky_without_disk_long():
@@ -391,7 +391,7 @@ def test_a_small_sun():
     """Half a degree of sky gives most of the light, and casts a shadow."""
     scene = _stage()
     _sky_world(0.05, sun_elevation=math.radians(40), sun_rotation=math.radians(200), sun_intensity=0.5)
-    assert_agrees(scene, samples=256, block=8, dark=_RIM)
+    assert_agrees(scene, samples=64, block=8, dark=_RIM)
 
 
 def test_a_sun_past_the_zenith_long():
@@ -428,7 +428,7 @@ def test_hosek_wilkie_sky():
     scene = _stage()
     sky = {"sky_type": "HOSEK_WILKIE", "sun_direction": (0.3, -0.5, 0.4), "turbidity": 3.5, "ground_albedo": 0.7}
     _sky_world(0.3, **sky)
-    assert_agrees(scene, samples=64, block=4, tolerance=0.005)
+    assert_agrees(scene, samples=16, block=4, tolerance=0.005)
 
 
 def test_hosek_wilkie_sky_of_a_sun_below_the_horizon_long():
@@ -447,7 +447,7 @@ def test_preetham_sky():
 def test_an_image_turned_about_x():
     scene = _stage()
     _image_world(degrees(20, 0, 0))
-    assert_agrees(scene, samples=64, block=4)
+    assert_agrees(scene, samples=16, block=4)
 
 
 def test_a_mirror_ball():
@@ -455,7 +455,7 @@ def test_a_mirror_ball():
     _image_world(degrees(10, 30, 200), pixels=smooth_pixels())
     texture = next(n for n in bpy.context.scene.world.node_tree.nodes if n.bl_idname == "ShaderNodeTexEnvironment")
     texture.projection = "MIRROR_BALL"
-    assert_agrees(scene, samples=64, block=4)
+    assert_agrees(scene, samples=16, block=4)
 
 
 def test_an_image_and_a_colour_mixed():
@@ -468,7 +468,7 @@ def test_an_image_and_a_colour_mixed():
     tree.links.new(first.outputs[0], mix.inputs[1])
     tree.links.new(second.outputs[0], mix.inputs[2])
     tree.links.new(mix.outputs[0], tree.nodes["World Output"].inputs["Surface"])
-    assert_agrees(scene, samples=64, block=4)
+    assert_agrees(scene, samples=16, block=4)
 
 
 def _image_in_world(**settings):
@@ -486,7 +486,7 @@ def test_image_textures_of_every_projection():
         coordinate = tree.nodes.new("ShaderNodeTexCoord")
         tree.links.new(coordinate.outputs["Generated"], texture.inputs["Vector"])
         print(projection)
-        assert_agrees(scene, samples=64, tolerance=0.01)
+        assert_agrees(scene, samples=16, tolerance=0.01)
 
 
 def test_an_image_texture_without_coordinates():
