@@ -29,9 +29,10 @@ Scene ball_over_floor(const Material& ball, const Material& floor)
 
 Regions regions_of(const Scene& scene, CausticKinds kinds, CausticsMode mode)
 {
-  RenderOptions options = caustic_options(scene, mode, 32, mode == CausticsMode::kOn ? 8 : 96);
+  const bool has_photons = mode == CausticsMode::kOn;
+  RenderOptions options = caustic_options(scene, mode, has_photons ? kFewPhotons.size : 32, has_photons ? 8 : 96);
   options.settings.caustics.kinds = kinds;
-  options.settings.caustics.photons = 1 << 15;
+  options.settings.caustics.photons = kFewPhotons.photons;
   return render_regions(scene, options, 6);
 }
 
