@@ -12,6 +12,7 @@ from scenes import (
     assert_warns,
     degrees,
     diffuse,
+    folder,
     make_sharp,
     new_material,
     new_scene,
@@ -357,6 +358,30 @@ def test_two_that_vary_and_overlap_an_even_one():
         add_sphere(1.0, v.material, (x, 0, 1.2))
     add_sphere(0.8, _volume("ShaderNodeVolumeAbsorption", Color=(0.5, 0.5, 0.5, 1), Density=1.0), (0, -0.3, 1.2))
     assert_agrees(scene, samples=24)
+
+
+def test_smoke_of_two_colors():
+    """Between its voxels and those beside, which have no colour, it is as bright as within."""
+    scene = _varying_scene()
+    add_light("SUN", rotation=degrees(50, 30, 0), energy=4.0)
+    set_world((0.2, 0.2, 0.25))
+    material = _volume("ShaderNodeVolumePrincipled", Density=10.0)
+    next(n for n in material.node_tree.nodes if n.type == "PRINCIPLED_VOLUME").inputs["Color Attribute"].default_value = "color"
+    domain = _add_box((1.6, 1.6, 2.2), material, (0, 0, 1.2))
+    domain.modifiers.new("fluid", "FLUID").fluid_type = "DOMAIN"
+    settings = domain.modifiers["fluid"].domain_settings
+    settings.domain_type, settings.resolution_max, settings.cache_type, settings.cache_frame_end = "GAS", 12, "REPLAY", 16
+    for x, color in ((-0.3, (0.9, 0.5, 0.2)), (0.3, (0.3, 0.5, 0.9))):
+        source = add_sphere(0.3, diffuse((0.5, 0.5, 0.5)), (x, 0, 0.7), segments=16)
+        source.hide_render = True
+        source.modifiers.new("fluid", "FLUID").fluid_type = "FLOW"
+        flow = source.modifiers["fluid"].flow_settings
+        flow.flow_behavior, flow.smoke_color = "INFLOW", color
+    with folder() as path:
+        settings.cache_directory = path
+        for frame in range(1, 17):
+            scene.frame_set(frame)
+        assert_agrees(scene, samples=48)
 
 
 def test_camera_within_fog_by_height():

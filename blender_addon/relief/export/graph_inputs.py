@@ -133,7 +133,9 @@ def _attribute(g, source):
             g.uses_generated = True
             return _output(g.add("texture-coordinate"), "generated")
         if g.voxels is not None and name in g.voxels:
-            return _constant(g, 1.0) if output == "alpha" else g.voxels.output(g, name, "value" if output == "value" else "color")
+            if output == "alpha" and not g.voxels.has_alpha(name):
+                return _constant(g, 1.0)
+            return g.voxels.output(g, name, "color" if output == "vector" else output)
         return mesh_attribute(g, *_STANDARD.get(name, ("attribute", name)), output)
     if node.attribute_type == "VIEW_LAYER":
         layer = g.view_layer()

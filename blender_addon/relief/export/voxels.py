@@ -25,6 +25,9 @@ _GRIDS = {
 #: Types of grids that the program reads.
 _NUMBERS = {"FLOAT", "DOUBLE", "INT", "INT64", "BOOLEAN", "VECTOR_FLOAT", "VECTOR_DOUBLE", "VECTOR_INT"}
 
+#: Below this Cycles takes colours as they are.
+_LEAST_ALPHA = 1e-6
+
 #: Rows that an image has at most.
 _MOST_ROWS = 65536
 
@@ -68,29 +71,46 @@ class Voxels:
     def __contains__(self, name):
         return name in self._grids
 
+    def has_alpha(self, name):
+        """Whether a grid's colours are multiplied by a fourth number."""
+        return self._grids[name].shape[-1] == 4
+
     def output(self, graph, name, output="color"):
         """Reference to what a grid has at a point, between the middles of voxels, as a node of a graph.
 
-        @param  output  "color", or "value" where a number is wanted
+        @param  output  "color", "value" where a number is wanted, or "alpha" of a grid that has it
         """
+        if output == "alpha":
+            return self._texture(graph, name, "alpha", "value")
+        found = self._texture(graph, name, "color", output)
+        if output == "value" or not self.has_alpha(name):
+            return found
+        # As Cycles, which divides by the fourth number between voxels, not in them: beside smoke there is no colour, not black.
+        alpha = graph.op("math", {"a": self._texture(graph, name, "alpha", "value"), "b": _LEAST_ALPHA}, "value", operation="maximum")
+        found = graph.op("vector-math", {"a": found, "b": alpha}, "vector", operation="divide")
+        # A mean of voxels is not above the largest: without saying so a quotient would have no bound.
+        most = self._most_color(name)
+        return graph.op("vector-math", {"a": found, "b": most}, "vector", operation="minimum")
+
+    def _most_color(self, name):
+        grid = self._grids[name]
+        colors = np.maximum(grid[..., :3], 0) / np.maximum(grid[..., 3:], _LEAST_ALPHA)
+        return [float(most) for most in colors.reshape(-1, 3).max(axis=0)]
+
+    def _texture(self, graph, name, part, output):
         depth, height, width, _ = self._grids[name].shape
         inputs = {"vector": graph.generated()}
         size = [width, height, depth]
-        return graph.op("voxel-texture", inputs, output, uri=self._uri(name), size=size, values="centers")
+        return graph.op("voxel-texture", inputs, output, uri=self._uri(name, part), size=size, values="centers")
 
-    def _uri(self, name):
-        if name not in self._uris:
-            self._uris[name] = self._write(self._grids[name])
-        return self._uris[name]
-
-    def _write(self, grid):
-        if grid.shape[-1] == 1:
-            return self._images.write_pixels({"Y": _slices(grid)[..., 0]})
-        # As Cycles, which takes what the fourth number has been multiplied by.
-        alpha = grid[..., 3:]
-        color = np.where((alpha > 1e-6) & (alpha != 1), grid[..., :3] / np.where(alpha > 1e-6, alpha, 1), grid[..., :3])
-        rows = _slices(color)
-        return self._images.write_pixels({name: rows[..., i] for i, name in enumerate("RGB")})
+    def _uri(self, name, part):
+        """URI of a grid's colours or numbers ("color"), or of its fourth number ("alpha")."""
+        if (name, part) not in self._uris:
+            grid = self._grids[name]
+            rows = _slices(grid[..., 3:] if part == "alpha" else grid[..., :3])
+            channels = "RGB" if rows.shape[-1] == 3 else "Y"
+            self._uris[name, part] = self._images.write_pixels({c: rows[..., i] for i, c in enumerate(channels)})
+        return self._uris[name, part]
 
 
 def _slices(grid):
@@ -128,6 +148,9 @@ class Grids:
 
     def __contains__(self, name):
         return name in self._names
+
+    def has_alpha(self, name):
+        return False
 
     def output(self, graph, name, output="color"):
         """As that of Voxels; of vectors the mean where a number is wanted."""
