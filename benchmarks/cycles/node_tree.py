@@ -12,9 +12,25 @@ class NodeTree:
         self.tree = self.material.node_tree
         self.tree.nodes.clear()
 
+    @classmethod
+    def of_geometry(cls, name):
+        """A tree of geometry nodes; `make` puts it to use."""
+        made = cls.__new__(cls)
+        made.tree = bpy.data.node_groups.new(name, "GeometryNodeTree")
+        if bpy.app.version < (4, 0, 0):
+            made.tree.outputs.new("NodeSocketGeometry", "Geometry")
+        else:
+            made.tree.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+        return made
+
+    def make(self, thing, geometry):
+        """Makes what an object is by a tree of geometry nodes, whose last socket is given."""
+        self.node("NodeGroupOutput", {0: geometry})
+        thing.modifiers.new(self.tree.name, "NODES").node_group = self.tree
+
     def node(self, kind, inputs=(), **attributes):
-        """A node; inputs by name or number are sockets to link or values."""
-        node = self.tree.nodes.new("ShaderNode" + kind)
+        """A node, of shaders unless its type's whole name is given; inputs by name or number are sockets to link or values."""
+        node = self.tree.nodes.new(kind if "Node" in kind else "ShaderNode" + kind)
         for name, value in attributes.items():
             setattr(node, name, value)
         for key, value in dict(inputs).items():

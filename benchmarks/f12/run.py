@@ -37,6 +37,7 @@ _RELMSE_FLOOR = 0.01  # as in exporters/image_metrics.h
 _REFERENCE_SEEDS = (1001, 1002)
 _BLOCK = 16  # pixels a side of the blocks whose means are compared
 _MOST_SAMPLES = 4096  # Blender's default, where a threshold ends the render
+_MODULES = {"usual": ("scenes.py", "more_scenes.py"), "inside": ("inside_scenes.py",)}  # of scenes, by the words for all of them
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,18 +64,19 @@ class Setting:
 
 
 def scene_functions():
-    """Source text of each scene of scenes.py and more_scenes.py by name, in their order; of all else there, by ""."""
-    functions, others = {}, ""
-    for name in ("scenes.py", "more_scenes.py", "stage.py", os.path.join("..", "cycles", "node_tree.py")):
+    """(source text by name of a scene, of all else by ""; names by word of _MODULES), both in the order of the modules."""
+    functions, groups, others = {}, {}, ""
+    files = [(word, name) for word, names in _MODULES.items() for name in names]
+    for word, name in (*files, ("", "stage.py"), ("", os.path.join("..", "cycles", "node_tree.py"))):
         with open(os.path.join(_FOLDER, name), encoding="utf-8") as file:
             source = file.read()
         for node in ast.parse(source).body:
-            is_scene = name.endswith("scenes.py") and isinstance(node, ast.FunctionDef) and not node.args.args
-            if is_scene and not node.name.startswith("_"):
+            if word and isinstance(node, ast.FunctionDef) and not node.args.args and not node.name.startswith("_"):
                 functions[node.name] = ast.get_source_segment(source, node)
+                groups.setdefault(word, []).append(node.name)
             else:
                 others += ast.get_source_segment(source, node)
-    return {**functions, "": others}
+    return {**functions, "": others}, groups
 
 
 def _hash(*parts):
@@ -258,7 +260,7 @@ def beside(row, pictures, first_row, first_pictures):
     }
 
 
-def _parse(arguments, names):
+def _parse(arguments, groups):
     def setting(word):
         value = float(word)
         return Setting(int(value)) if value >= 1 else Setting(_MOST_SAMPLES, value)
@@ -268,7 +270,9 @@ def _parse(arguments, names):
 
     cache = os.path.join(os.environ.get("XDG_CACHE_HOME", os.path.expanduser("~/.cache")), "relief_f12")
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("scenes", nargs="*", metavar="SCENE", help=f"a .blend, or of {', '.join(names)} (default: all of these)")
+    names = [name for group in groups.values() for name in group]
+    known = "; ".join(f"{word}, which are {', '.join(group)}" for word, group in groups.items())
+    parser.add_argument("scenes", nargs="*", metavar="SCENE", default=["usual"], help=f"a .blend, or of {known} (default: usual)")
     parser.add_argument("--at", type=lambda text: [setting(w) for w in text.split(",")], default="64,.05,.01", metavar="LIST",
                         help="samples (1 and more) and noise thresholds (below 1) (default: 64,.05,.01)")
     parser.add_argument("--max-samples", type=int, metavar="N", help=f"where there is a threshold (default: {_MOST_SAMPLES})")
@@ -286,6 +290,7 @@ def _parse(arguments, names):
     parser.add_argument("--cache", default=cache, metavar="FOLDER", help=f"scenes and references (default: {cache})")
     parser.add_argument("--output", default="f12", metavar="FOLDER", help="page, pictures and results.json (default: f12)")
     options = parser.parse_args(arguments)
+    options.scenes = [name for word in options.scenes for name in groups.get(word, [word])]
     for name in options.scenes:
         if name not in names and not os.path.isfile(name):
             parser.error(f"{name}: neither a file nor one of the scenes {', '.join(names)}")
@@ -299,14 +304,13 @@ def _parse(arguments, names):
 
 
 def main(arguments):
-    functions = scene_functions()
-    names = [name for name in functions if name]
-    options = _parse(arguments, names)
+    functions, groups = scene_functions()
+    options = _parse(arguments, groups)
     os.makedirs(options.output, exist_ok=True)
     results, failed = [], []
     with tempfile.TemporaryDirectory() as scratch:
         bench = Bench(options, scratch)
-        for name in options.scenes or names:
+        for name in options.scenes:
             try:
                 results.append(bench.measure(name, bench.blend(name, functions)))
             except RuntimeError as error:

@@ -1,10 +1,10 @@
 """Scenes of the kinds that people make, each a function without arguments that builds it in the open file.
 
-With Blender's default settings, and nothing of what relief leaves out (volumes, subsurface scattering, hair).
+With Blender's default settings. Volumes, subsurface scattering and hair are in inside_scenes.py.
 
     blender -b --factory-startup --addons relief --python benchmarks/f12/scenes.py -- FOLDER [SCENE…]
 
-writes each as FOLDER/SCENE.blend; needs the add-on in Blender's scripts folder, as benchmarks/f12/f12.py has it.
+writes each as FOLDER/SCENE.blend; needs the add-on in Blender's scripts folder, as benchmarks/f12/run.py has it.
 """
 
 import math
@@ -17,6 +17,7 @@ import bpy
 sys.dont_write_bytecode = True
 sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
+import inside_scenes  # noqa: E402
 import more_scenes  # noqa: E402
 import stage  # noqa: E402
 from stage import NodeTree  # noqa: E402
@@ -255,12 +256,14 @@ def car():
 #: By name, in the order of the tables.
 SCENES = {f.__name__: f for f in (monkeys, still_life, room, lamps, doughnuts, landscape, pavilion, pebbles, neon, car)}
 SCENES |= more_scenes.SCENES
+SCENES |= inside_scenes.SCENES
 
 
 def main(folder, names):
+    stage.folder = os.path.abspath(folder)
     for name in names or SCENES:
         SCENES[name]()
-        bpy.ops.wm.save_as_mainfile(filepath=os.path.join(os.path.abspath(folder), f"{name}.blend"))
+        bpy.ops.wm.save_as_mainfile(filepath=os.path.join(stage.folder, f"{name}.blend"))
 
 
 if __name__ == "__main__":

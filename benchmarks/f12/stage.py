@@ -24,6 +24,9 @@ WHITE, BLACK = (0.8, 0.8, 0.8), (0.02, 0.02, 0.02)
 #: Height that glass stands at: in the plane of a table, which of the two a ray meets first would be the engine's chance.
 CLEAR = 0.002
 
+#: Where scenes are written to, for what has to lie beside them.
+folder = ""
+
 
 def begin(color=(0.05, 0.05, 0.05), strength=1.0):
     """An empty file with the add-on and a plain world; returns the world's node tree."""
@@ -157,7 +160,8 @@ def add(shape, material, location=(0, 0, 0), scale=(1, 1, 1), rotation=(0, 0, 0)
     if subdivide:
         modifier = made.modifiers.new("subdivision", "SUBSURF")
         modifier.levels = modifier.render_levels = subdivide
-    made.data.materials.append(material)
+    if material is not None:
+        made.data.materials.append(material)
     return made
 
 
