@@ -101,58 +101,108 @@ RELIEF_KERNEL F8 noise_gradient(W8 hash, const F8 (&d)[kDims])
   }
 }
 
-/// A coordinate of noise that repeats, so that there is a lattice however far away a point is.
-RELIEF_KERNEL F8 noise_repeated(F8 x)
+/// The same of three dimensions, times kNoiseGradientUnit.
+#ifdef __AVX2__
+inline constexpr float kNoiseGradientUnit = 2.0f;
+RELIEF_KERNEL F8 noise_gradient_by_table(W8 hash, const F8 (&d)[3])
 {
-  constexpr float kPeriod = 100000.0f, kWhole = 1000000.0f;
-  const I8 is_far = abs(x) >= kPeriod;
-  if (mask_of(is_far) == 0) return x;
-  for (int k = 0; k < 8; ++k) {
-    // Where floats are whole numbers, points would all lie on the lattice, where noise is 0.
-    const float off_lattice = __builtin_fabsf(x[k]) >= kWhole ? 0.5f : 0.0f;
-    x[k] = std::fmod(x[k], kPeriod) + off_lattice;
-  }
-  return x;
+  // Components are ±2 or 0: floats of which only the first byte is not 0, and a table of sixteen bytes is one instruction.
+  constexpr char p = 0x40, n = static_cast<char>(0xc0);
+  const W8 index = (hash & 15u) << 24 | 0x00808080u;
+  const auto component = [index](__m128i of_hash) {
+    const __m256i table = _mm256_broadcastsi128_si256(of_hash);
+    return __builtin_bit_cast(F8, _mm256_shuffle_epi8(table, __builtin_bit_cast(__m256i, index)));
+  };
+  return component(_mm_setr_epi8(p, n, p, n, p, n, p, n, 0, 0, 0, 0, p, 0, n, 0)) * d[0] +
+         component(_mm_setr_epi8(p, p, n, n, 0, 0, 0, 0, p, n, p, n, p, n, p, n)) * d[1] +
+         component(_mm_setr_epi8(0, 0, 0, 0, p, p, n, n, p, p, n, n, 0, p, 0, n)) * d[2];
 }
+#else
+inline constexpr float kNoiseGradientUnit = 1.0f;
+RELIEF_KERNEL F8 noise_gradient_by_table(W8 hash, const F8 (&d)[3]) { return noise_gradient<3>(hash, d); }
+#endif
 
-/// Signed gradient noise, about −1 … 1; 0 where it is not finite.
-/// @param at       any floats
-/// @param repeats  every 100,000 units along each axis
+/// Where a point is in its cell of the lattice.
 template <int kDims>
-RELIEF_KERNEL F8 noise_signed(const F8 (&at)[kDims], bool repeats = false)
+struct NoiseCell {
+  W8 low[kDims];   ///< its lower corner
+  F8 d[kDims];     ///< from there, [0, 1)
+  F8 fade[kDims];  ///< weight of the upper sides
+};
+
+/// Noise between the corners whose last kFixed axes are as in kCorner, a bit each, in units of their gradients' products. The
+/// corners are no loop, which keeps nothing for the next and takes a quarter longer.
+template <int kDims, int kFixed = 0, unsigned kCorner = 0>
+[[gnu::always_inline]] RELIEF_KERNEL F8 noise_between(const NoiseCell<kDims>& cell)
 {
-  F8 p[kDims];
-  for (int i = 0; i < kDims; ++i) p[i] = repeats ? noise_repeated(at[i]) : at[i];
-  // Brings the ranges of the dimensions to one.
-  constexpr float kScale[] = {0.25f, 0.6616f, 0.9820f, 0.8344f};
-  W8 cell[kDims];
-  F8 d[kDims], fade[kDims];
-  for (int i = 0; i < kDims; ++i) {
-    const F8 low = floor(p[i]);
-    // Beyond the range of int all lanes' words are the same, and the noise is that of one cell: no lattice is left there.
-    cell[i] = __builtin_bit_cast(W8, __builtin_convertvector(clamp(low, -2147483648.0f, 2147483520.0f), I8));
-    d[i] = p[i] - low;
-    fade[i] = d[i] * d[i] * d[i] * (d[i] * (d[i] * 6.0f - 15.0f) + 10.0f);
-  }
-  constexpr int kCorners = 1 << kDims;
-  F8 value[kCorners];
-  for (int corner = 0; corner < kCorners; ++corner) {
+  if constexpr (kFixed == kDims) {
     W8 key[kDims];
     F8 from[kDims];
     for (int i = 0; i < kDims; ++i) {
-      const std::uint32_t step = static_cast<std::uint32_t>(corner >> i) & 1u;
-      key[i] = cell[i] + step;
-      from[i] = d[i] - static_cast<float>(step);
+      key[i] = cell.low[i] + (kCorner >> i & 1u);
+      from[i] = cell.d[i] - static_cast<float>(kCorner >> i & 1u);
     }
-    value[corner] = noise_gradient<kDims>(hash_words(key), from);
+    if constexpr (kDims == 3)
+      return noise_gradient_by_table(hash_words(key), from);
+    else
+      return noise_gradient<kDims>(hash_words(key), from);
+  } else {
+    constexpr int kAxis = kDims - 1 - kFixed;
+    const F8 low = noise_between<kDims, kFixed + 1, kCorner>(cell);
+    const F8 high = noise_between<kDims, kFixed + 1, kCorner | 1u << kAxis>(cell);
+    return low * (1.0f - cell.fade[kAxis]) + high * cell.fade[kAxis];
   }
+}
+
+/// Noise that repeats does so every so many units, so that there is a lattice however far away a point is.
+inline constexpr float kNoisePeriod = 100000.0f;
+
+template <int kDims>
+RELIEF_KERNEL F8 noise_repeated(const F8 (&at)[kDims]);
+
+/// Signed gradient noise, about −1 … 1; 0 where it is not finite.
+/// @param at       any floats
+/// @param repeats  every kNoisePeriod along each axis
+template <int kDims>
+RELIEF_KERNEL F8 noise_signed(const F8 (&at)[kDims], bool repeats = false)
+{
+  if (repeats) {
+    I8 is_far{};
+    for (int i = 0; i < kDims; ++i) is_far |= abs(at[i]) >= kNoisePeriod;
+    if (mask_of(is_far) != 0) [[unlikely]]
+      return noise_repeated<kDims>(at);
+  }
+  // Brings the ranges of the dimensions to one.
+  constexpr float kScale[] = {0.25f, 0.6616f, 0.9820f, 0.8344f};
+  NoiseCell<kDims> cell;
   for (int i = 0; i < kDims; ++i) {
-    for (int k = 0; k < kCorners >> (i + 1); ++k) {
-      value[k] = value[2 * k] * (1.0f - fade[i]) + value[2 * k + 1] * fade[i];
+    const F8 low = floor(at[i]);
+    // Beyond the range of int all lanes' words are the same, and the noise is that of one cell: no lattice is left there.
+    cell.low[i] = __builtin_bit_cast(W8, __builtin_convertvector(clamp(low, -2147483648.0f, 2147483520.0f), I8));
+    const F8 d = at[i] - low;
+    cell.d[i] = d;
+    cell.fade[i] = d * d * d * (d * (d * 6.0f - 15.0f) + 10.0f);
+  }
+  const F8 noise = noise_between<kDims>(cell) * (kScale[kDims - 1] / (kDims == 3 ? kNoiseGradientUnit : 1.0f));
+  return abs(noise) < kInfinity ? noise : F8{};
+}
+
+/// The same of points some of which are a period away or more.
+template <int kDims>
+[[gnu::noinline]] RELIEF_KERNEL F8 noise_repeated(const F8 (&at)[kDims])
+{
+  constexpr float kWhole = 1000000.0f;
+  F8 p[kDims];
+  for (int i = 0; i < kDims; ++i) {
+    p[i] = at[i];
+    for (int k = 0; k < 8; ++k) {
+      if (!(__builtin_fabsf(p[i][k]) >= kNoisePeriod)) continue;
+      // Where floats are whole numbers, points would all lie on the lattice, where noise is 0.
+      const float off_lattice = __builtin_fabsf(p[i][k]) >= kWhole ? 0.5f : 0.0f;
+      p[i][k] = std::fmod(p[i][k], kNoisePeriod) + off_lattice;
     }
   }
-  const F8 noise = value[0] * kScale[kDims - 1];
-  return abs(noise) < kInfinity ? noise : F8{};
+  return noise_signed<kDims>(p);
 }
 
 /// What a sum of octaves looks like; each may differ between lanes.
