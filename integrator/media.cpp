@@ -8,30 +8,10 @@
 #include "integrator/instance_box.h"
 #include "integrator/instance_hit.h"
 #include "kernel/stage/path_access.h"
-#include "kernel/volume/distance.h"
-#include "kernel/volume/medium_walk.h"
 
 namespace relief {
 
 namespace {
-
-Vec3f sigma_t_of(const KernelGlobals& g, const MediumState& m)
-{
-  Vec3f sum;
-  for (int i = 0; i < m.size; ++i) sum += g.media[medium_of_instance(g, m.inside[i])].sigma_t;
-  return sum;
-}
-
-/// Of a part of a shadow ray that lies in the same media.
-Vec3f transmittance_of(const KernelGlobals& g, const MediumState& inside, const ShadowWay& way, float from, float to)
-{
-  if (!media_vary(g, inside)) return medium_transmittance(sigma_t_of(g, inside), to - from);
-  if (!(to > from)) return {1, 1, 1};
-  const auto number = __builtin_bit_cast(std::uint32_t, from);
-  MediumWalk walk =
-      medium_walk_make(g, inside, way.O + way.D * from, way.D, to - from, hash_mix_32(way.seed ^ hash_mix_32(number)));
-  return medium_walk_transmittance(g, walk, way.ray);
-}
 
 /// Whether what an instance bounds does no more than to darken what is seen through its surface. Openings are in sight there, and such
 /// meshes are often sewn from parts that meet up to rounding alone.
@@ -174,13 +154,13 @@ Vec3f shadow_transmittance(const KernelGlobals& g,
   Vec3f passes{1, 1, 1};
   float from = 0;
   for (const ShadowBoundary& boundary : boundaries) {
-    passes *= transmittance_of(g, inside, way, from, boundary.t);
+    passes *= g.shadow_transmittance(g, inside, way, from, boundary.t);
     if (is_zero(passes)) return passes;
     from = boundary.t;
     medium_cross(inside, boundary.instance, boundary.is_front);
   }
   if (!(way.t_max < kInfinity)) medium_leave_all(inside);
-  return passes * transmittance_of(g, inside, way, from, way.t_max);
+  return passes * g.shadow_transmittance(g, inside, way, from, way.t_max);
 }
 
 }  // namespace relief

@@ -9,6 +9,7 @@
 #include "integrator/scene_context.h"
 #include "kernel/math/box.h"
 #include "kernel/state/path_state.h"
+#include "kernel/volume/shadow_way.h"
 
 namespace relief {
 
@@ -47,14 +48,6 @@ struct ShadowBoundary {
   std::int32_t instance;
   std::uint32_t triangle;  ///< of a hit that is met twice it is the same
   bool is_front;           ///< the ray enters
-};
-
-/// A shadow ray, as media along it ask.
-struct ShadowWay {
-  Vec3f O, D;          ///< world, unit
-  float t_max = 0;     ///< metres
-  std::uint32_t seed;  ///< of the random numbers by which media that vary are asked
-  GraphRay ray;        ///< what their graphs may read of it
 };
 
 /// What media leave of a shadow ray; where some vary, a random number of that mean.

@@ -1,5 +1,5 @@
-// The stages of media, compiled once an instruction set like stages.cpp, with RELIEF_SHADE_MEDIA and RELIEF_SHADE_PHOTON_MEDIA naming
-// its two functions. Apart from the others, for scenes without media never come here.
+// The stages of media, compiled once an instruction set like stages.cpp, with RELIEF_SHADE_MEDIA, RELIEF_SHADE_PHOTON_MEDIA and
+// RELIEF_SHADOW_TRANSMITTANCE naming its functions. Apart from the others, for scenes without media never come here.
 #include "integrator/stages.h"
 #include "kernel/stage/shade_medium.h"
 
@@ -45,6 +45,15 @@ void RELIEF_SHADE_PHOTON_MEDIA(const KernelGlobals& g,
 {
   keep_those_that_arrive(
       queues, [&](std::uint32_t path, MediumHit hit) { return photon_medium(g, state, path, hit, next, photons); });
+}
+
+Vec3f RELIEF_SHADOW_TRANSMITTANCE(const KernelGlobals& g,
+                                  const MediumState& inside,
+                                  const ShadowWay& way,
+                                  float from,
+                                  float to)
+{
+  return media_shadow_transmittance(g, inside, way, from, to);
 }
 
 }  // namespace relief

@@ -249,6 +249,7 @@ void SceneContext::make_views()
   globals.graphs = graphs.data();
   globals.run_graph = stage_table_select().run_graph;
   globals.emitter_radiance = emitter_graph_radiance;
+  globals.shadow_transmittance = stage_table_select().shadow_transmittance;
   globals.lamps = scene.lamps.data();
   globals.lights.motions = motion.views();
   globals.textures = scene.textures->views().data();

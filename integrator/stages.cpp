@@ -302,6 +302,7 @@ const StageTable kTable = {
     shade_photons,
     finish,
     RELIEF_GRAPH_RUN,
+    RELIEF_SHADOW_TRANSMITTANCE,
 };
 
 }  // namespace

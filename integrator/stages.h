@@ -89,6 +89,7 @@ struct StageTable {
                  Counters&,
                  std::uint64_t& first_nonfinite);
   GraphRun run_graph;
+  ShadowTransmittance shadow_transmittance;
 };
 
 /// The interpreter of value graphs: see GraphRun.
@@ -113,6 +114,18 @@ void shade_photon_media_avx2(const KernelGlobals& g,
                              HitQueues& queues,
                              QueueView& next,
                              PhotonQueueView& photons);
+
+/// See ShadowTransmittance.
+Vec3f shadow_transmittance_baseline(const KernelGlobals& g,
+                                    const MediumState& inside,
+                                    const ShadowWay& way,
+                                    float from,
+                                    float to);
+Vec3f shadow_transmittance_avx2(const KernelGlobals& g,
+                                const MediumState& inside,
+                                const ShadowWay& way,
+                                float from,
+                                float to);
 
 /// See StageTable::leave_surfaces.
 void leave_surfaces_baseline(

@@ -24,6 +24,8 @@ struct BounceLimits {
 
 struct BsdfTables;  // kernel/bsdf/energy_tables.h
 struct KernelGlobals;
+struct MediumState;    // kernel/state/medium_state.h
+struct ShadowWay;      // kernel/volume/shadow_way.h
 struct VaryingMedium;  // kernel/volume/varying_place.h
 
 /// A point of a light and a ray that takes light from there.
@@ -38,6 +40,11 @@ struct EmitterPoint {
 /// @param emitter   in world space
 using EmitterRadiance = Vec3f (*)(const KernelGlobals& g, const Light& emitter, const EmitterPoint& at);
 
+/// What media leave of a part of a shadow ray that lies in the same ones; where some vary, a random number of that mean.
+/// @param from,to  metres along the ray
+using ShadowTransmittance =
+    Vec3f (*)(const KernelGlobals& g, const MediumState& inside, const ShadowWay& way, float from, float to);
+
 struct KernelGlobals {
   const MeshView* meshes = nullptr;
   const InstanceView* instances = nullptr;
@@ -49,6 +56,7 @@ struct KernelGlobals {
   const GraphProgramView* graphs = nullptr;  ///< by Material::graph_index and Lamp::graph_index
   GraphRun run_graph = nullptr;
   EmitterRadiance emitter_radiance = nullptr;
+  ShadowTransmittance shadow_transmittance = nullptr;
   const Lamp* lamps = nullptr;  ///< by Light::lamp_index
   GraphScene graph_scene;
   const TextureView* textures = nullptr;

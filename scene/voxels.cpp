@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <new>
+#include <system_error>
 
 #include "kernel/graph/voxels.h"
 #include "scene/diagnostics.h"
@@ -79,6 +80,11 @@ std::shared_ptr<const Voxels> voxels_load(const std::filesystem::path& file,
     if (is_out_of_memory(error)) throw OutOfMemory(label + ": " + error);
     fail("an OpenVDB file", error);
   };
+  std::error_code unknown;
+  const std::filesystem::file_status status = std::filesystem::status(file, unknown);
+  // A pipe may have no end, or no beginning.
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status))
+    fail("a regular file", "something else");
   try {
     const std::unique_ptr<VoxelFile> reader = voxel_process_make();
     VoxelHeader header;

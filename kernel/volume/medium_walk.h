@@ -14,9 +14,11 @@
 #include <cmath>
 #include <new>
 
+#include "kernel/math/lanes.h"
 #include "kernel/sample/sobol.h"
 #include "kernel/state/medium_state.h"
 #include "kernel/volume/distance.h"
+#include "kernel/volume/shadow_way.h"
 #include "kernel/volume/varying_medium.h"
 
 namespace relief {
@@ -38,6 +40,7 @@ struct WalkStretch {
   RateBox box;
   Vec3f depth;  ///< optical, of all before it
   float left;   ///< about the light that gets to it: samples get rarer by that
+  float samples;  ///< in it, see walk_samples
 };
 
 /// Stretches that a walk has at most: where there are more, neighbours become one. A ray through the middle of an object has some fifty.
@@ -111,24 +114,89 @@ RELIEF_KERNEL void walk_join(MediumWalk& walk)
                          {a.box.sigma_t * share + b.box.sigma_t * rest, a.box.residual * share + b.box.residual * rest,
                           a.box.shows * share + b.box.shows * rest},
                          {},
+                         0,
                          0};
     start = b.end;
   }
   walk.num_stretches = half;
 }
 
-RELIEF_KERNEL void walk_add(MediumWalk& walk, const WalkStretch& stretch)
+RELIEF_KERNEL void walk_add(MediumWalk& walk, float end, const RateBox& box)
 {
   if (walk.num_stretches > 0) {
     WalkStretch& last = walk.stretches[walk.num_stretches - 1];
-    if (last.box.sigma_t == stretch.box.sigma_t && last.box.residual == stretch.box.residual &&
-        last.box.shows == stretch.box.shows) {
-      last.end = stretch.end;
+    if (last.box.sigma_t == box.sigma_t && last.box.residual == box.residual && last.box.shows == box.shows) {
+      last.end = end;
       return;
     }
     if (walk.num_stretches == kMostStretches) walk_join(walk);
   }
-  walk.stretches[walk.num_stretches++] = stretch;
+  // By its parts: one that is put together first and copied then is waited for.
+  WalkStretch& stretch = walk.stretches[walk.num_stretches++];
+  stretch.end = end;
+  stretch.box.sigma_t = box.sigma_t;
+  stretch.box.residual = box.residual;
+  stretch.box.shows = box.shows;
+}
+
+/// Finds the stretches of a walk through one grid of one level. Which side of a box a ray leaves by is not to be foretold, so this does not
+/// branch by it.
+/// @param even  what is everywhere besides
+RELIEF_KERNEL void walk_find_in_grid(MediumWalk& walk, const RateGrid& grid, const RateBox& even)
+{
+  using F4 [[gnu::vector_size(16)]] = float;
+  using I4 [[gnu::vector_size(16)]] = std::int32_t;
+  const Vec3f D = walk.D / grid.cell, O = (walk.O - rate_grid_middle(grid)) / grid.cell;
+  const float half = 0.5f * static_cast<float>(grid.size), from[3] = {O.x, O.y, O.z}, to[3] = {D.x, D.y, D.z};
+  float enters = 0, leaves = walk.length;
+  for (int i = 0; i < 3; ++i) {
+    if (to[i] == 0.0f) {
+      if (!(__builtin_fabsf(from[i]) <= half)) leaves = 0;
+      continue;
+    }
+    const float inverse = 1.0f / to[i], a = (-half - from[i]) * inverse, b = (half - from[i]) * inverse;
+    enters = max(enters, min(a, b));
+    leaves = min(leaves, max(a, b));
+  }
+  if (!(enters < leaves)) return walk_add(walk, walk.length, even);
+  if (enters > 0.0f) walk_add(walk, enters, even);
+  // Where the ray gets to along each axis next, and what that changes; of lane 3 and of axes that it does not go along: never.
+  F4 border{}, origin{}, inverse{}, step{};
+  std::ptrdiff_t strides[3];
+  border += kInfinity;
+  inverse += 1.0f;
+  const RateBox* box = grid.boxes;
+  std::ptrdiff_t stride = 1;
+  for (int i = 0; i < 3; ++i, stride *= grid.size) {
+    const int n = static_cast<int>(clamp(from[i] + to[i] * enters + half, 0.0f, 2.0f * half - 1.0f));
+    const bool up = to[i] > 0.0f;
+    box += stride * n;
+    strides[i] = up ? stride : -stride;
+    if (to[i] == 0.0f) continue;
+    border[i] = static_cast<float>(up ? n + 1 : n) - half;
+    origin[i] = from[i];
+    inverse[i] = 1.0f / to[i];
+    step[i] = up ? 1.0f : -1.0f;
+  }
+  std::ptrdiff_t moves[8];
+  for (int i = 0; i < 8; ++i) {
+    moves[i] = (i & 1 ? strides[0] : 0) + (i & 2 ? strides[1] : 0) + (i & 4 ? strides[2] : 0);
+  }
+  for (float t = enters;;) {
+    // The same sum as that by which it leaves the grid: no box is beyond.
+    const F4 next = (border - origin) * inverse;
+    const float end = min(min(next[0], next[1]), next[2]);
+    const float until = min(end, leaves);
+    if (until > t) {
+      walk_add(walk, until, {box->sigma_t + even.sigma_t, box->residual + even.residual, box->shows + even.shows});
+      t = until;
+    }
+    if (!(end < leaves)) break;
+    const I4 crosses = next == F4{} + end;
+    border += __builtin_bit_cast(F4, __builtin_bit_cast(I4, step) & crosses);
+    box += moves[_mm_movemask_ps(__builtin_bit_cast(__m128, crosses)) & 7];
+  }
+  if (leaves < walk.length) walk_add(walk, walk.length, even);
 }
 
 /// Finds the stretches of a walk.
@@ -142,6 +210,10 @@ RELIEF_KERNEL void walk_find(MediumWalk& walk)
     else
       walk.even.emission = {};
   }
+  if (walk.size == 1) {
+    const RateGrid& grid = varying_place(*walk.media[0], walk.instances[0]).rates;
+    if (grid.num_levels == 1) return walk_find_in_grid(walk, grid, even);
+  }
   struct Ways {
     Ways() {}
     union {
@@ -152,17 +224,18 @@ RELIEF_KERNEL void walk_find(MediumWalk& walk)
     ways.of[i] = rate_way_make(varying_place(*walk.media[i], walk.instances[i]).rates, walk.O, walk.D);
   }
   for (float t = 0; t < walk.length;) {
-    WalkStretch stretch{walk.length, even, {}, 0};
+    float end = walk.length;
+    RateBox box = even;
     for (int i = 0; i < walk.size; ++i) {
       const RateWay& way = ways.of[i];
-      stretch.end = min(stretch.end, way.end);
+      end = min(end, way.end);
       if (way.box == nullptr) continue;
-      stretch.box.sigma_t += way.box->sigma_t;
-      stretch.box.residual += way.box->residual;
-      stretch.box.shows += way.box->shows;
+      box.sigma_t += way.box->sigma_t;
+      box.residual += way.box->residual;
+      box.shows += way.box->shows;
     }
-    if (stretch.end > t) walk_add(walk, stretch);
-    t = stretch.end;
+    if (end > t) walk_add(walk, end, box);
+    t = end;
     for (int i = 0; i < walk.size; ++i) {
       if (!(ways.of[i].end > t)) rate_way_go(ways.of[i]);
     }
@@ -237,19 +310,21 @@ medium_walk_make(const KernelGlobals& g, const MediumState& m, Vec3f O, Vec3f D,
   }
   walk_find(walk);
   float start = 0, residual = 0;
+  Vec3f depth;
   for (int i = 0; i < walk.num_stretches; ++i) {
     WalkStretch& stretch = walk.stretches[i];
     const float size = stretch.end - start;
     if (stretch.box.residual > 0.0f) residual += stretch.box.residual * size;
-    const auto add = [size](float& depth, float sigma) {
-      if (sigma > 0.0f) depth += sigma * size;
+    const auto add = [size](float& to, float sigma) {
+      if (sigma > 0.0f) to += sigma * size;
     };
-    stretch.depth = walk.depth;
-    add(walk.depth.x, stretch.box.sigma_t.x);
-    add(walk.depth.y, stretch.box.sigma_t.y);
-    add(walk.depth.z, stretch.box.sigma_t.z);
+    stretch.depth = depth;
+    add(depth.x, stretch.box.sigma_t.x);
+    add(depth.y, stretch.box.sigma_t.y);
+    add(depth.z, stretch.box.sigma_t.z);
     start = stretch.end;
   }
+  walk.depth = depth;
   if (residual > 0.0f) {
     walk.factor = max(1.0f, min(kCollisionsOfSquare * residual, kWantedCollisions / residual));
     walk_collide(walk);
@@ -273,6 +348,16 @@ RELIEF_KERNEL WalkPart walk_samples(const WalkStretch& stretch, float length)
   if (!(rate > 0.0f)) return {0.0f, 0.0f, 0.0f};
   if (!(length < kInfinity)) return {fades > 0.0f ? rate / fades : 0.0f, rate, fades};
   return {rate * length / (1.0f + fades * length), rate, fades};
+}
+
+/// Goes on to the next sample.
+RELIEF_KERNEL void walk_place_sample(MediumWalk& walk)
+{
+  walk_place_go(walk, walk.sample, [](const WalkStretch& stretch, float length) {
+    WalkPart part = walk_samples(stretch, length);
+    part.size = stretch.samples;
+    return part;
+  });
 }
 
 /// Whether something sends out light.
@@ -299,17 +384,18 @@ RELIEF_KERNEL void medium_walk_sample(MediumWalk& walk, float u)
     WalkStretch& stretch = walk.stretches[i];
     stretch.left = left;
     const WalkPart part = walk_samples(stretch, stretch.end - start);
+    stretch.samples = part.size;
     sum += part.size;
     if (part.size > 0.0f && left > kLittleShows) {
       walk.reach = stretch.end < kInfinity ? stretch.end : start + 4.0f / part.fades;
     }
-    left /= 1.0f + min_component(stretch.box.sigma_t) * (stretch.end - start);
+    left *= 1.0f / (1.0f + min_component(stretch.box.sigma_t) * (stretch.end - start));
     start = stretch.end;
   }
   if (!(sum > 0.0f)) return;
   walk.spacing = sum / kWantedSamples;
   walk.sample.next = walk.spacing * u;
-  walk_place_go(walk, walk.sample, walk_samples);
+  walk_place_sample(walk);
 }
 
 /// Goes on to the next sample that is near a light.
@@ -362,7 +448,7 @@ RELIEF_KERNEL bool walk_next(MediumWalk& walk, MediumPlaces& out)
       walk_collide(walk);
     } else if (walk.sample.t == t) {
       walk.sample.next += walk.spacing;
-      walk_place_go(walk, walk.sample, walk_samples);
+      walk_place_sample(walk);
     } else {
       walk_near(walk);
       if (t < 0.0f) continue;
@@ -451,6 +537,25 @@ RELIEF_KERNEL Vec3f medium_walk_transmittance(const KernelGlobals& g, MediumWalk
     }
   }
   return is_zero(left) ? left : left * passes;
+}
+
+/// See ShadowTransmittance.
+RELIEF_KERNEL Vec3f media_shadow_transmittance(const KernelGlobals& g,
+                                               const MediumState& inside,
+                                               const ShadowWay& way,
+                                               float from,
+                                               float to)
+{
+  if (!media_vary(g, inside)) {
+    Vec3f sigma_t;
+    for (int i = 0; i < inside.size; ++i) sigma_t += g.media[medium_of_instance(g, inside.inside[i])].sigma_t;
+    return medium_transmittance(sigma_t, to - from);
+  }
+  if (!(to > from)) return {1, 1, 1};
+  const auto number = __builtin_bit_cast(std::uint32_t, from);
+  MediumWalk walk =
+      medium_walk_make(g, inside, way.O + way.D * from, way.D, to - from, hash_mix_32(way.seed ^ hash_mix_32(number)));
+  return medium_walk_transmittance(g, walk, way.ray);
 }
 
 }  // namespace relief

@@ -11,6 +11,8 @@
 #include <iterator>
 #include <random>
 
+#include <sys/stat.h>
+
 #include "kernel/graph/voxels.h"
 #include "scene/diagnostics.h"
 #include "scene/memory.h"
@@ -189,6 +191,26 @@ TEST(Voxels, OfAFileWithAChangedByteAreAnErrorAtWorst)
     }
   }
   EXPECT_LT(num_errors, kTimes);
+}
+
+// One changed byte, and the library reads billions of things that the file does not have.
+TEST(Voxels, OfAFileWithoutEndAreAnError)
+{
+  const File file({cloud()});
+  {
+    std::fstream bytes(file.path(), std::ios::binary | std::ios::in | std::ios::out);
+    bytes.seekp(806);
+    bytes.put('\x7f');
+  }
+  EXPECT_NE(file.failure("density").find("CPU time limit exceeded"), std::string::npos);
+}
+
+TEST(Voxels, OfAPipeAreAnError)
+{
+  const File file({cloud()});
+  std::filesystem::remove(file.path());
+  ASSERT_EQ(::mkfifo(file.path().c_str(), 0600), 0);
+  EXPECT_NE(file.failure("density").find("a regular file"), std::string::npos);
 }
 
 TEST(Voxels, OfNoneAreAnError)
