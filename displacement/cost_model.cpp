@@ -23,7 +23,7 @@ DisplacementChoice displacement_choose(std::span<const MethodOffer> offers,
   DisplacementChoice best;
   double best_seconds = 0;
   for (const MethodOffer& offer : offers) {
-    const double seconds = method_seconds(offer.cost, offer.num_micro_triangles, num_rays);
+    const double seconds = method_seconds(offer.cost, offer.num_micro_triangles, num_rays) + offer.preparation_seconds;
     char text[96];
     std::snprintf(text, sizeof text, "%.2g s by %s", seconds, displacement_method_label(offer.method).data());
     std::string said = text;

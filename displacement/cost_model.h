@@ -19,6 +19,7 @@ struct MethodOffer {
   MethodCost cost = {};
   std::uint64_t num_micro_triangles = 0;  ///< as method_seconds has it
   std::uint64_t bytes = 0;                ///< while it is built
+  double preparation_seconds = 0;         ///< besides
 };
 
 struct DisplacementChoice {

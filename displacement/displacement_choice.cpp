@@ -6,6 +6,8 @@
 
 #include <unistd.h>
 
+#include "displacement/picture_share.h"
+
 namespace relief {
 
 namespace {
@@ -184,24 +186,23 @@ PictureView DisplacementSet::picture_view(const Use& use, const DisplacementOpti
           static_cast<double>(use.settings.coarser_outside)};
 }
 
-/// About which part of a picture's rays meet a use: how much of the picture the boxes of its instances fill, together at
-/// most all of it; 1 without a camera.
-double DisplacementSet::picture_share(const Use& use, const DisplacementOptions& options)
+/// About which part of a picture's rays meet each use; 1 without a camera. Where together they would cover more than the picture, they
+/// hide one another.
+std::vector<double> DisplacementSet::shares_of(std::span<const Use> uses, const DisplacementOptions& options)
 {
-  if (!options.camera || options.picture_height <= 0) return 1;
-  const PictureView view = picture_view(use, options);
-  const double height = view.height;
-  const double width =
-      height * static_cast<double>(options.camera->half_width) / static_cast<double>(options.camera->half_height);
-  Box3 box = box_empty();
-  for (std::uint32_t i = 0; i < use.mesh.num_vertices; ++i) box = box_union(box, {use.mesh.P[i], use.mesh.P[i]});
-  double share = 0;
-  for (const Affine3& place : use.places) {
-    const Vec3f low = transform_point(place, box.low), high = transform_point(place, box.high);
-    const double pixels = view.pixels(low, high) / view.coarsening(0.5 * (to_double(low) + to_double(high)));
-    share += std::min(pixels * pixels / (width * height), 1.0);
+  std::vector<double> shares(uses.size(), 1.0);
+  if (!options.camera || options.picture_height <= 0) return shares;
+  double sum = 0;
+  for (std::size_t k = 0; k < uses.size(); ++k) {
+    // What is not in the picture is met by bounced light alone. (Not measured: it is diced so coarsely that little pays.)
+    constexpr double kBounced = 1.0 / 16;
+    const PictureView view = picture_view(uses[k], options);
+    const double seen = picture_share(uses[k].mesh, uses[k].places, view);
+    shares[k] = seen > 0 ? seen : kBounced * box_share(uses[k].mesh, uses[k].places, view);
+    sum += shares[k];
   }
-  return std::min(share, 1.0);
+  for (double& share : shares) share /= std::max(sum, 1.0);
+  return shares;
 }
 
 }  // namespace relief

@@ -89,10 +89,12 @@ DisplacementSet::DisplacementSet(const DisplacementInput& input, const Displacem
       kept_meshes_(options.meshes)
 {
   const std::vector<Use> uses = find_uses(input);
+  const std::vector<double> shares = shares_of(uses, options);
   std::uint64_t tessellated_bytes = 0;
   std::vector<std::pair<int, int>> places;  // of each use: its geometry or its moved mesh
   PartsOfMoved parts_of_moved;
-  for (const Use& use : uses) {
+  for (std::size_t k = 0; k < uses.size(); ++k) {
+    const Use& use = uses[k];
     std::vector<LatticeTriangle> parts;
     if (const VertexMove move = vertex_move_of(use, options, &parts, &tessellated_bytes); move != VertexMove::kNone) {
       places.emplace_back(-1, static_cast<int>(moved_.size()));
@@ -107,7 +109,7 @@ DisplacementSet::DisplacementSet(const DisplacementInput& input, const Displacem
       continue;
     }
     geometries_.push_back(make_displaced(use, options));
-    const double num_rays = options.num_rays * picture_share(use, options);
+    const double num_rays = options.num_rays * shares[k];
     if (!use.steps.empty()) {
       leave_untessellated(use, options);
     } else if (has_error(use, options)) {

@@ -209,7 +209,7 @@ class DisplacementSet {
     bool has_borders = false;  ///< walls end at its surface, which is one then: rays choose no levels by their cones
   };
   static PictureView picture_view(const Use& use, const DisplacementOptions& options);
-  static double picture_share(const Use& use, const DisplacementOptions& options);
+  static std::vector<double> shares_of(std::span<const Use> uses, const DisplacementOptions& options);
   std::vector<Use> find_uses(const DisplacementInput& input);
   Levels levels_of(const Use& use, const DisplacementOptions& options) const;
   std::unique_ptr<PreparedMesh> make_displaced(const Use& use, const DisplacementOptions& options);

@@ -369,6 +369,37 @@ TEST(Dicing, PaysForManyInstancesAsForOne)
   EXPECT_EQ(SceneContext(scene, options).displacements.method_names(), "chord");
 }
 
+/// What counts are the rays that meet a mesh: those of its part of the picture, and of that what others leave.
+TEST(Dicing, PaysByThePartOfThePictureThatAMeshFills)
+{
+  Scene scene = close_sphere(64, 4, 0.2);
+  DisplacementOptions options = options_of(scene, 1, 200);
+  options.camera->world_from_camera.p = {0, 0, 3};
+  // Seconds by chord that the first mesh is said to take.
+  const auto seconds = [&] {
+    const SceneContext context(scene, options);
+    const std::string reason = context.displacements.reasons().at(0);
+    const std::size_t end = reason.find(" s by chord");
+    const std::size_t start = reason.rfind(' ', end - 1);
+    return std::stod(reason.substr(start + 1, end - start - 1));
+  };
+  const Camera& camera = *options.camera;
+  const double window = 4.0 * static_cast<double>(camera.half_width) * static_cast<double>(camera.half_height);
+  const double outline = 3.14159265 / 8 / window;
+  ASSERT_LT(outline, 1);
+  EXPECT_NEAR(seconds(), 1250 * outline, 0.1 * 1250 * outline);
+  options.camera->world_from_camera.p = {0, 0, 30};
+  EXPECT_NEAR(seconds(), 1250 * outline * 8 / 899, 0.1 * 1250 * outline * 8 / 899);
+  options.camera->world_from_camera.p = {0, 0, 3};
+  // A wall in the same picture, displaced as well, takes all of it: the ball has its part of both together.
+  scene.meshes.push_back(scene.meshes[0]);
+  scene.instances.push_back(scene.instances[0]);
+  Instance& wall = scene.instances.back();
+  wall.mesh_index = 1;
+  wall.world_from_object = {{30, 0, 0}, {0, 30, 0}, {0, 0, 30}, {0, 0, -40}};
+  EXPECT_NEAR(seconds(), 1250 * outline / (1 + outline), 0.1 * 1250 * outline / (1 + outline));
+}
+
 /// However it is diced, a mesh has the triangles that it has: where these do not pay, those that dicing would make are not counted,
 /// which takes longer than tracing a small picture of a mesh of millions.
 TEST(Dicing, IsNotCountedWhereTheMeshAloneDoesNotPay)

@@ -210,6 +210,10 @@ TEST(AutomaticDisplacement, ChoosesTheLeastOfTheSumsThatItNames)
   EXPECT_EQ(displacement_choose(offers, 1.6e7, kAmple).method, M::tessellate_grid);
   EXPECT_EQ(displacement_choose(offers, 1.8e7, kAmple).method, M::tessellate);
   EXPECT_EQ(displacement_choose(offers, 1e9, 1000).method, M::chord);
+  // What is to be done before it is built counts.
+  const MethodOffer prepared[] = {offers[0], {M::tessellate, {300, 50, 500}, kCount, kBytes, 4.0}};
+  EXPECT_EQ(displacement_choose(prepared, 1e7, kAmple).method, M::chord);
+  EXPECT_EQ(displacement_choose(prepared, 1.1e7, kAmple).method, M::tessellate);
   EXPECT_NE(displacement_choose(offers, 1e9, 1000).reason.find("too large"), std::string::npos);
 }
 
