@@ -68,7 +68,7 @@ class Film {
  public:
   /// @param aov_mask            bit i keeps enumerator i of Aov; beauty is always kept
   /// @param cryptomatte_levels  ids that a Cryptomatte keeps of a pixel
-  /// @param keeps_clear         where the environment is not seen, alpha is not coverage alone, see film_add_clear
+  /// @param keeps_clear         alpha is not coverage by surfaces alone, see film_add_clear
   /// @param counts_samples      each pixel has a number of its own, see judge
   Film(int width,
        int height,

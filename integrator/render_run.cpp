@@ -199,6 +199,9 @@ double seconds_to_sample(const RenderOptions& options)
   return std::max(1e-3, options.time_limit_seconds - earlier_seconds(options));
 }
 
+/// Whether samples may be covered by something else than a surface.
+bool has_media(const Scene& scene) { return !scene.media.empty() || scene.environment.medium.has_value(); }
+
 Film film_make(const Scene& scene, const RenderOptions& options)
 {
   const RenderSettings& settings = options.settings;
@@ -207,7 +210,7 @@ Film film_make(const Scene& scene, const RenderOptions& options)
           window.height,
           options.aov_mask,
           settings.cryptomatte_levels,
-          !scene.environment.visible_to_camera || has_holdouts(scene),
+          !scene.environment.visible_to_camera || has_holdouts(scene) || has_media(scene),
           settings.noise_threshold > 0};
 }
 

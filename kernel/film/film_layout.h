@@ -90,7 +90,8 @@ struct AovInfo {
 };
 
 inline constexpr std::array<AovInfo, kNumAovs> kAovInfo = {{
-    {Aov::kBeauty, "beauty", "RGBA", false, "radiance; A = coverage by geometry"},
+    {Aov::kBeauty, "beauty", "RGBA", false,
+     "radiance; A = coverage by geometry, and by media as far as they let no light through"},
     {Aov::kDirect, "direct", "RGB", false, "light after at most one scattering event, emission seen directly included"},
     {Aov::kIndirect, "indirect", "RGB", false, "light after two or more scattering events"},
     {Aov::kAlbedo, "albedo", "RGB", false, "base colour of the first non-transparent hit"},

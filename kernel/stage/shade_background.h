@@ -42,11 +42,12 @@ RELIEF_KERNEL void shade_background(const KernelGlobals& g, PathState& state, st
   const bool is_kept = scatterings == 0 && g.film.layout.environment >= 0;
   const bool is_shown = scatterings == 0 ? g.environment_visible_to_camera
                                          : (g.environment_hidden_from & path_ray_kind(state.flags[path])) == 0;
-  // What has passed through clear glass, or a filter, leaves as much of the film clear as it has kept of its light.
-  if (!g.environment_visible_to_camera && (state.flags[path] & kPathCovers) == 0) {
+  // What has passed through clear glass, a filter, or media leaves as much of the film clear as it has kept of its light. Of media
+  // that is so before surroundings that are seen, too: paths pass them by another chance than by what they let through.
+  if ((!g.environment_visible_to_camera || state.media != nullptr) && (state.flags[path] & kPathCovers) == 0) {
     const float share = light_scalar(path_throughput(state, path));
     film_add_clear(g.film, state.pixel[path], (state.flags[path] & kPathSawSurface) != 0 ? share : share - 1.0f);
-    if (scatterings > 0) return;
+    if (scatterings > 0 && !g.environment_visible_to_camera) return;
   }
   if (!is_shown && !is_kept) return;
   if (path_leaves_to_photons(g, state.flags[path], -1)) return;

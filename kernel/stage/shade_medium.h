@@ -152,6 +152,11 @@ RELIEF_KERNEL void shade_medium_scatter(const KernelGlobals& g,
                                         Vec2f u,
                                         QueueView& next)
 {
+  // It covers the film whatever becomes of it, and a surface that it meets is not what the camera sees there.
+  if ((state.flags[path] & kPathSawSurface) == 0) {
+    state.flags[path] |= kPathSawSurface;
+    film_add_clear(g.film, state.pixel[path], -1.0f);
+  }
   const Vec3f wi = media_sample(media, at.D, u);
   const PhaseEval phase = media_eval(media, at.D, wi);
   if (!(phase.pdf > 0.0f)) return;

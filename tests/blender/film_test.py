@@ -154,6 +154,30 @@ def test_transparent_glass():
         assert _alpha(scene, "RELIEF").mean() > relief.mean() + 0.02
 
 
+def test_media_cover_a_transparent_film():
+    """By what they do not let through: even ones and such that vary, before nothing and before a floor."""
+    scene = new_scene()
+    scene.render.film_transparent = True
+    scene.cycles.volume_step_rate = 0.2
+    add_plane(3, diffuse((0.8, 0.5, 0.3)))
+    for x, is_even in ((-1.0, True), (1.0, False)):
+        material, tree, node = new_material("smoke", "ShaderNodeVolumePrincipled", Density=1.5)
+        output = next(n for n in tree.nodes if n.bl_idname == "ShaderNodeOutputMaterial")
+        tree.links.remove(output.inputs["Surface"].links[0])
+        tree.links.new(node.outputs[0], output.inputs["Volume"])
+        if not is_even:
+            tree.links.new(tree.nodes.new("ShaderNodeTexNoise").outputs["Fac"], node.inputs["Density"])
+        add_sphere(0.8, material, (x, 0, 0.9))
+    set_world((0.3, 0.4, 0.5))
+    add_light("SUN", rotation=degrees(40, 20, 0), energy=2)
+    add_camera((0, -6, 1.5), degrees(85, 0, 0), lens=50)
+    set_bounces(scene, 1)
+    relief, cycles = _alpha(scene, "RELIEF"), _alpha(scene, "CYCLES")
+    assert abs(relief.mean() - cycles.mean()) < 0.004, (relief.mean(), cycles.mean())
+    blocks = [a[:48, :64].reshape(6, 8, 8, 8).mean(axis=(1, 3)) for a in (relief, cycles)]
+    assert np.abs(blocks[0] - blocks[1]).max() < 0.03, np.abs(blocks[0] - blocks[1]).max()
+
+
 def test_holdouts_are_black():
     """Closures of an object that is held out left their light where alpha is 0."""
     from relief import exr

@@ -28,6 +28,42 @@ TEST(Media, ThatOverlapAddUp)
   expect_mean(scene, 4, std::exp(-0.5), 1e-5, 2);
 }
 
+TEST(Media, CoverTheFilmByWhatTheyDoNotLetThrough)
+{
+  for (const bool environment_is_seen : {false, true}) {
+    for (const int bounces : {0, 4}) {
+      Scene scene = view();
+      scene.environment.color = {1, 1, 1};
+      scene.environment.visible_to_camera = environment_is_seen;
+      scene.render.max_bounces = scene.render.volume_bounces = bounces;
+      const Vec3f grey{0.3f, 0.3f, 0.3f};
+      add_medium(scene, box_mesh({1, 1, 1}), scattering(grey, 0.2f, 0.5f * grey));
+      expect_mean(scene, 16, 1 - std::exp(-0.45 * 2), 1e-5, 3);
+      // Some of what is scattered meets it, too, and is no more than covered.
+      add_object(scene, quad_mesh({-9, -9, -2}, {18, 0, 0}, {0, 18, 0}), diffuse_material({0.6f, 0.6f, 0.6f}));
+      expect_mean(scene, 16, 1, 1e-5, 3);
+    }
+  }
+}
+
+TEST(Media, HideSurfacesFromTheLayersOfWhatIsSeen)
+{
+  Scene scene = view();
+  scene.render.max_bounces = scene.render.volume_bounces = 4;
+  const Vec3f white{1, 1, 1};
+  add_medium(scene, box_mesh({1, 1, 1}), scattering(white, 0));
+  // Paths that were scattered meet these at other depths.
+  add_object(scene, quad_mesh({-9, -9, -2}, {18, 0, 0}, {0, 18, 0}), diffuse_material({0.6f, 0.6f, 0.6f}));
+  add_object(scene, quad_mesh({2, -9, -9}, {0, 18, 0}, {0, 0, 18}), diffuse_material({0.6f, 0.6f, 0.6f}));
+  const Rendered rendered = render_scene(scene, render_options(scene, 8, 64));
+  for (int y = 0; y < 8; ++y) {
+    for (int x = 0; x < 8; ++x) {
+      EXPECT_NEAR(rendered.at(Aov::kDepth, x, y)[0], 6, 1e-4);
+      EXPECT_NEAR(rendered.at(Aov::kPosition, x, y)[0], 0.1, 1e-3);
+    }
+  }
+}
+
 TEST(Media, AreAroundACameraThatStandsInThem)
 {
   Scene scene = view();
