@@ -8,6 +8,7 @@
 
 #include "cli/darkness.h"
 #include "cli/value_hint.h"
+#include "integrator/stages.h"
 #include "scene/diagnostics.h"
 
 namespace relief {
@@ -41,6 +42,7 @@ LoadOptions SceneSetup::load_options(std::optional<int> frame) const
   options.environment = environment;
   options.continue_without_textures = continue_without_textures;
   options.emission_shows = emission_shows;
+  options.run_graph = stage_table_select().run_graph;
   if (!background.empty()) options.environment_visible = background == "world";
   return options;
 }

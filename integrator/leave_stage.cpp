@@ -7,6 +7,7 @@ namespace relief {
 
 namespace {
 
+/// Graphs are run for up to eight paths that leave one material and follow each other.
 template <unsigned kFeatures>
 void leave_all(const KernelGlobals& g,
                PathState& state,
@@ -15,8 +16,35 @@ void leave_all(const KernelGlobals& g,
                ShadowQueue& shadow,
                Counters& counters)
 {
-  for (std::uint32_t i = 0; i < queue.size; ++i) {
-    leave_surface<kFeatures>(g, state, queue.paths[i], next, shadow, counters);
+  constexpr std::uint32_t kLanes = 8;
+  const auto material_of = [&](std::uint32_t path) { return g.instances[state.hit_object[path]].material_index; };
+  counters.surface_hits += queue.size;
+  GraphRegisters registers;
+  registers.rays = g.graph_scene.rays;
+  SurfaceInteraction located[kLanes];
+  for (std::uint32_t first = 0, count = 0; first < queue.size; first += count) {
+    const std::uint32_t* const paths = queue.paths + first;
+    const auto material = material_of(paths[0]);
+    count = 1;
+    while (count < kLanes && first + count < queue.size && material_of(paths[count]) == material) ++count;
+    surface_interactions_locate<kFeatures & kFeatureTextures>(g, state, paths, static_cast<int>(count), located);
+    const std::int32_t graph = g.materials[material].graph_index;
+    const GraphProgramView* const program = graph >= 0 ? &g.graphs[graph] : nullptr;
+    if (program != nullptr) {
+      for (std::uint32_t k = 0; k < count; ++k) {
+        graph_load_point(*program,
+                         surface_graph_point(g, state, paths[k], located[k], -path_direction(state, paths[k])),
+                         static_cast<int>(k), registers);
+      }
+      registers.used = (1u << count) - 1;
+      g.run_graph(*program, g.textures, registers);
+      counters.graph_runs += 1;
+      counters.graph_points += count;
+    }
+    for (std::uint32_t k = 0; k < count; ++k) {
+      const GraphHit hit{{program, &registers, static_cast<int>(k)}};
+      leave_surface<kFeatures>(g, state, paths[k], located[k], program != nullptr ? &hit : nullptr, next, shadow);
+    }
   }
 }
 

@@ -223,7 +223,8 @@ bool Walker::walk(std::uint32_t path)
     if (is_out) t = ray.ray.tfar;
     P += t * D;
 
-    Vec3f pdf = flight_pdf(sigma_t, t, is_out);
+    const Vec3f passed = medium_transmittance(sigma_t, t);
+    Vec3f pdf = is_out ? passed : sigma_t * passed;
     if (step > 0) {
       Vec3f guided = (guide.pdf(cosine) / phase) * flight_pdf(guide.stretch(cosine) * sigma_t, t, is_out);
       if (across >= 0.0f) {
@@ -232,7 +233,6 @@ bool Walker::walk(std::uint32_t path)
       }
       pdf = lerp(guided_share, pdf, guided);
     }
-    const Vec3f passed = medium_transmittance(sigma_t, t);
     throughput *= (is_out ? passed : sigma_s * passed) / dot(chances, pdf);
     if (!is_finite(throughput)) return false;
     if (is_out) {

@@ -105,6 +105,7 @@ Scene GltfLoader::load(const std::filesystem::path& path, const LoadOptions& opt
 {
   const GltfDocument& root = documents_.load(path, warnings_);
   root_ = &root;
+  height_graphs_.run_by(options.run_graph);
   scene_.file = root.file;
   scene_.render = relief_render(root, warnings_);
   if (options.luminous_efficacy > 0) scene_.render.luminous_efficacy = options.luminous_efficacy;

@@ -44,7 +44,7 @@ double random_number(std::uint64_t index)
 /// A graph of heights over the mesh's texture coordinates, whose v points down.
 class Height {
  public:
-  Height(const GraphProgram& program, int uv_set) : view_(program.view()), uv_set_(uv_set) {}
+  Height(const GraphProgram& program, int uv_set, GraphRun run) : view_(program.view()), uv_set_(uv_set), run_(run) {}
 
   F8 operator()(const Lanes& u, const Lanes& v) const
   {
@@ -59,7 +59,7 @@ class Height {
         lanes[static_cast<int>(k)] = static_cast<float>(is_u ? u[k] : 1 - v[k]);
       }
     }
-    graph_program_run(view_, registers);
+    run_(view_, nullptr, registers);
     const std::uint16_t result = view_.results[0];
     return result == kNoGraphOperand ? F8{} : graph_operand(view_, registers, result);
   }
@@ -67,6 +67,7 @@ class Height {
  private:
   GraphProgramView view_;
   int uv_set_;
+  GraphRun run_;
 };
 
 /// Texels along one direction of a map.
@@ -316,7 +317,7 @@ HeightGraph HeightGraphTable::add(const GltfDocument& document,
     return known->second = keep(document, graph, warnings);
   static_cast<void>(height_graph_read(document, graph, images, attribute_names, warnings));
 
-  const Height height(program, ref.uv_set);
+  const Height height(program, ref.uv_set, run_);
   Findings found;
   if (program.inputs.empty()) {
     layout = {};

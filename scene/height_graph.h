@@ -28,6 +28,9 @@ class HeightGraphTable {
   /// @param scene     gets these graphs, and the names of attributes that they read
   HeightGraphTable(TextureTable& textures, Scene& scene) : textures_(textures), scene_(scene) {}
 
+  /// @param run  evaluates graphs of which maps are made
+  void run_by(GraphRun run) { run_ = run; }
+
   /// Evaluates the heightGraph of a RELIEF_displacement, or keeps it.
   /// @param displacement  the extension's object, which has a heightGraph
   /// @param material      as warnings name it
@@ -55,6 +58,7 @@ class HeightGraphTable {
 
   TextureTable& textures_;
   Scene& scene_;
+  GraphRun run_ = graph_program_run;
   std::vector<HeightMap> maps_;
   std::map<std::string, HeightGraph> known_;  ///< by the graph's JSON
 };

@@ -300,17 +300,19 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
   }
 }
 
-/// Writes a point's quantities to its lane of the registers.
-RELIEF_KERNEL void graph_load_point(const GraphProgramView& program, GraphPoint at, int lane, GraphRegisters& registers)
+/// As graph_load_point, of a program that reads points beside it.
+/// @param at  whose P_object is set
+RELIEF_KERNEL void graph_load_shifted(const GraphProgramView& program,
+                                      GraphPoint at,
+                                      int lane,
+                                      GraphRegisters& registers)
 {
-  if (program.num_inputs == 0) return;
-  at.P_object = transform_point(at.instance->object_from_world, at.hit->P);
+  const GraphFootprint footprint = graph_footprint(at);
+  // Whatever else a point has, it is on the same triangle.
+  at.footprint_axes = &footprint;
   SurfaceHit moved[2];
   GraphPoint shifted[2];
   const GraphPoint* const points[3] = {&at, &shifted[0], &shifted[1]};
-  const GraphFootprint footprint = program.is_shifted ? graph_footprint(at) : GraphFootprint{};
-  // Whatever else a point has, it is on the same triangle.
-  if (program.is_shifted) at.footprint_axes = &footprint;
   float width = -1.0f;  // by which the points are moved
   for (std::uint32_t i = 0; i < program.num_inputs; ++i) {
     const GraphInput input = program.inputs[i];
@@ -322,6 +324,18 @@ RELIEF_KERNEL void graph_load_point(const GraphProgramView& program, GraphPoint 
     }
     registers.lanes[input.register_index][lane] =
         graph_quantity(*points[static_cast<int>(input.shift)], input.quantity, input.index);
+  }
+}
+
+/// Writes a point's quantities to its lane of the registers.
+RELIEF_KERNEL void graph_load_point(const GraphProgramView& program, GraphPoint at, int lane, GraphRegisters& registers)
+{
+  if (program.num_inputs == 0) return;
+  at.P_object = transform_point(at.instance->object_from_world, at.hit->P);
+  if (program.is_shifted) return graph_load_shifted(program, at, lane, registers);
+  for (std::uint32_t i = 0; i < program.num_inputs; ++i) {
+    const GraphInput& input = program.inputs[i];
+    registers.lanes[input.register_index][lane] = graph_quantity(at, input.quantity, input.index);
   }
 }
 

@@ -72,4 +72,13 @@ struct GraphValues {
   std::uint32_t given = 0;     ///< bit GraphOutput
 };
 
+struct GraphRegisters;  // kernel/graph/graph_registers.h
+struct TextureView;     // kernel/texture/texture_view.h
+
+/// Runs a program over eight points. A pointer, as the interpreter is compiled once for every instruction set, and apart from
+/// the stages.
+/// @param textures   those of the scene
+/// @param registers  the program's inputs are filled; lanes that mean nothing may hold anything
+using GraphRun = void (*)(const GraphProgramView& program, const TextureView* textures, GraphRegisters& registers);
+
 }  // namespace relief

@@ -45,12 +45,6 @@ struct GraphRegisters {
   GraphRays rays = {};
 };
 
-/// Runs a program over eight points. A pointer, as the interpreter is compiled once for every instruction set, and apart from
-/// the stages.
-/// @param textures   those of the scene
-/// @param registers  the program's inputs are filled; lanes that mean nothing may hold anything
-using GraphRun = void (*)(const GraphProgramView& program, const TextureView* textures, GraphRegisters& registers);
-
 RELIEF_KERNEL F8 graph_operand(const GraphProgramView& program, const GraphRegisters& registers, std::uint16_t operand)
 {
   return operand < kMostGraphRegisters ? registers.lanes[operand]

@@ -1,7 +1,6 @@
 // Stage: a path has walked below a surface (enter_surface.h) and leaves it. What it leaves by is diffuse.
 #pragma once
 
-#include "kernel/counters.h"
 #include "kernel/stage/surface_continue.h"
 #include "kernel/stage/surface_light.h"
 #include "kernel/stage/surface_photons.h"
@@ -21,20 +20,21 @@ RELIEF_KERNEL Vec3f subsurface_normal(const MixtureLobes& lobes, Vec3f otherwise
 
 /// Lights and scatters one path that has got out.
 /// Next: intersect closest (pushed on `next`), or the path ends. At most one ray is added to `shadow`.
+/// @param at     where, located
+/// @param graph  see surface_interaction_resolve
 template <unsigned kFeatures>
 [[gnu::flatten]] RELIEF_KERNEL void leave_surface(const KernelGlobals& g,
                                                   PathState& state,
                                                   std::uint32_t path,
+                                                  SurfaceInteraction& at,
+                                                  const GraphHit* graph,
                                                   QueueView& next,
-                                                  ShadowQueue& shadow,
-                                                  Counters& counters)
+                                                  ShadowQueue& shadow)
 {
-  ++counters.surface_hits;
   const Vec3f wo = -path_direction(state, path);
   const ScatterSamples u = scatter_samples(state.pixel_hash[path], state.sample_index[path], path_surface(state, path));
-  SurfaceInteraction at = surface_interaction_locate<kFeatures>(g, state, path, wo);
   MixtureLobes lobes;
-  surface_interaction_resolve<kFeatures>(g, state, path, wo, at, lobes);
+  surface_interaction_resolve<kFeatures>(g, state, path, wo, at, lobes, graph);
   surface_interaction_frame<kFeatures>(g, state, path, wo, at);
   const Vec3f N = subsurface_normal(lobes, at.side.Ns);
   at.params = {};

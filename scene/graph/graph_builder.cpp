@@ -70,7 +70,7 @@ std::size_t GraphProgram::bytes() const
          closures.size() * sizeof(SurfaceClosureSpec) + voxels.size() * sizeof(VoxelView) + sizeof(GraphProgram);
 }
 
-void graph_program_run(const GraphProgramView& program, GraphRegisters& registers)
+void graph_program_run(const GraphProgramView& program, const TextureView* /*textures*/, GraphRegisters& registers)
 {
   graph_run(program, nullptr, registers);
 }
@@ -171,7 +171,7 @@ std::vector<GraphScalar> GraphBuilder::fold(GraphOp op,
   GraphProgramView view = program.view();
   view.tables = tables_.data();
   GraphRegisters registers;
-  graph_program_run(view, registers);
+  graph_program_run(view, nullptr, registers);
   std::vector<GraphScalar> out;
   for (int i = 0; i < shape.num_outputs; ++i) out.push_back(constant(registers.lanes[i][0]));
   return out;

@@ -51,10 +51,9 @@ struct GraphSun {
   float radius;   ///< angle
 };
 
-struct GraphRegisters;  // kernel/graph/graph_registers.h
-
 /// Runs a program that reads no image, where scenes are made; what renders has its own for every instruction set.
+/// @param textures   not read
 /// @param registers  the program's inputs are filled
-void graph_program_run(const GraphProgramView& program, GraphRegisters& registers);
+void graph_program_run(const GraphProgramView& program, const TextureView* textures, GraphRegisters& registers);
 
 }  // namespace relief

@@ -60,7 +60,7 @@ Medium medium_of(const VolumeProgram& volume)
 {
   const GraphProgramView view = volume.program.view();
   GraphRegisters registers;
-  graph_program_run(view, registers);
+  graph_program_run(view, nullptr, registers);
   return medium_resolve(volume.closures, {&view, &registers, 0});
 }
 

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <string>
 
@@ -241,6 +242,19 @@ TEST(HeightGraph, IsEvaluatedIntoAMapThatRepeats)
   EXPECT_EQ(settings(scene).height.m00, 1);
   EXPECT_LT(sine_error(scene, 4, 0, {-1.5f, -0.5f}, {2.5f, 1.5f}), 1.0f / 512);
   EXPECT_EQ(num_warnings(scene, "heightGraph"), 0u);
+}
+
+TEST(HeightGraph, IsEvaluatedByTheInterpreterThatIsGiven)
+{
+  static std::atomic<int> num_runs;
+  num_runs = 0;
+  LoadOptions options;
+  options.run_graph = [](const GraphProgramView& program, const TextureView* textures, GraphRegisters& registers) {
+    ++num_runs;
+    graph_program_run(program, textures, registers);
+  };
+  const Scene scene = load(square_displaced({{"heightGraph", sine_graph(4)}}), options);
+  EXPECT_GE(num_runs, height_map(scene).width * height_map(scene).height / 8);
 }
 
 TEST(HeightGraph, RepeatsAlongTheDirectionThatIsPeriodic)
