@@ -107,9 +107,7 @@ struct alignas(64) PathState {
 };
 
 enum PathFlag : std::uint32_t {
-  kPathSawSurface =
-      1u
-      << 0,  ///< an opaque-enough surface was met: the AOVs of the first hit are written; or none will be, see shade_medium_scatter
+  kPathSawSurface = 1u << 0,   ///< the AOVs of the first hit are written, or none will be, see shade_medium_scatter
   kPathCounted = 1u << 1,      ///< coverage was added to the film's alpha
   kPathOnlyDelta = 1u << 2,    ///< every scattering event so far was a delta one
   kPathAfterSoft = 1u << 3,    ///< the last scattering event is one where photons are gathered
