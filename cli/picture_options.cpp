@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "cli/scene_setup.h"
+#include "integrator/stages.h"
 #include "scene/framing.h"
 
 namespace relief {
@@ -59,6 +60,7 @@ PictureCameras picture_cameras(const Scene& scene, const PictureOptions& options
   load.has_frame = frame.has_value();
   load.frame = frame.value_or(0);
   load.needs_camera = true;
+  load.run_graph = stage_table_select().run_graph;
   load.camera.shutter = 0.0f;  // Motion is of the scene: such a camera stands still.
   Scene other = scene_load(options.camera_from, load);
   return {std::move(other.cameras), std::move(other.files)};

@@ -65,11 +65,8 @@ float diffusion_length(float albedo)
 }
 
 /// Density of a free flight's end in each channel, or, where it has met the surface, its chance to get that far.
-Vec3f flight_pdf(Vec3f sigma_t, float t, bool is_out)
-{
-  const Vec3f passed = medium_transmittance(sigma_t, t);
-  return is_out ? passed : sigma_t * passed;
-}
+/// @param passed  share of light that gets there
+Vec3f flight_pdf(Vec3f sigma_t, Vec3f passed, bool is_out) { return is_out ? passed : sigma_t * passed; }
 
 /// What the walks of a queue share.
 struct Walker {
@@ -224,11 +221,15 @@ bool Walker::walk(std::uint32_t path)
     P += t * D;
 
     const Vec3f passed = medium_transmittance(sigma_t, t);
-    Vec3f pdf = is_out ? passed : sigma_t * passed;
+    Vec3f pdf = flight_pdf(sigma_t, passed, is_out);
     if (step > 0) {
-      Vec3f guided = (guide.pdf(cosine) / phase) * flight_pdf(guide.stretch(cosine) * sigma_t, t, is_out);
+      const auto stretched_pdf = [&](float stretch) {
+        const Vec3f sigma = stretch * sigma_t;
+        return flight_pdf(sigma, medium_transmittance(sigma, t), is_out);
+      };
+      Vec3f guided = (guide.pdf(cosine) / phase) * stretched_pdf(guide.stretch(cosine));
       if (across >= 0.0f) {
-        const Vec3f back = (guide.pdf(-cosine) / phase) * flight_pdf(guide.stretch(-cosine) * sigma_t, t, is_out);
+        const Vec3f back = (guide.pdf(-cosine) / phase) * stretched_pdf(guide.stretch(-cosine));
         guided = lerp(back_share, guided, back);
       }
       pdf = lerp(guided_share, pdf, guided);

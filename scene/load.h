@@ -28,8 +28,8 @@ struct LoadOptions {
   /// Asked of scenes without light but for what glows, with the place of their camera: whether that is enough. Null: points of
   /// surfaces decide alone, see emission_lights_scene.
   bool (*emission_shows)(const Scene& scene, std::size_t camera) = nullptr;
-  GraphRun run_graph =
-      graph_program_run;  ///< evaluates heights of which maps are made; this one runs everywhere, and slowly
+  /// Evaluates heights of which maps are made. This one runs everywhere, and slowly.
+  GraphRun run_graph = graph_program_run;
 
   bool operator==(const LoadOptions&) const = default;
 };

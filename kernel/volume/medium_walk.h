@@ -38,8 +38,8 @@ RELIEF_KERNEL float counted_next(CountedNumbers& numbers)
 struct WalkStretch {
   float end;  ///< metres; where the next one begins
   RateBox box;
-  Vec3f depth;  ///< optical, of all before it
-  float left;   ///< about the light that gets to it: samples get rarer by that
+  Vec3f depth;    ///< optical, of all before it
+  float left;     ///< about the light that gets to it: samples get rarer by that
   float samples;  ///< in it, see walk_samples
 };
 
