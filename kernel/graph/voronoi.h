@@ -181,46 +181,32 @@ RELIEF_KERNEL void assign_where(I8 is, F8 (&to)[kDims], const F8 (&from)[kDims])
   for (int i = 0; i < kDims; ++i) to[i] = is ? from[i] : to[i];
 }
 
-/// What distances are compared by: of Euclid's the square.
-template <int kDims, bool kPcg>
-[[gnu::always_inline]] RELIEF_KERNEL F8 voronoi_order(const F8 (&a)[kDims],
-                                                      const F8 (&b)[kDims],
-                                                      const VoronoiSettings<kDims, kPcg>& settings)
-{
-  if (kDims == 1 || settings.metric != VoronoiMetric::kEuclidean) return voronoi_distance<kDims>(a, b, settings);
-  F8 sum{};
-  for (int i = 0; i < kDims; ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
-  return sum;
-}
-
 /// The nearest point, or the second, and its cell.
 template <bool kSecond, int kDims, bool kPcg>
 RELIEF_KERNEL Voronoi<kDims> voronoi_nearest(const F8 (&cell)[kDims],
                                              const F8 (&local)[kDims],
                                              const VoronoiSettings<kDims, kPcg>& settings)
 {
-  const bool squares = kDims > 1 && settings.metric == VoronoiMetric::kEuclidean;
-  const F8 far = settings.far(), most = squares ? far * far : far;
-  F8 first = most, second = most;
+  // Roots are compared, not squares: of two points whose roots round to the same number the first counts, as in Cycles.
+  F8 first = settings.far(), second = settings.far();
   F8 offset1[kDims]{}, offset2[kDims]{}, point1[kDims]{}, point2[kDims]{};
   voronoi_cells<kDims>(cell, settings, 1, [&](const F8(&offset)[kDims], const F8(&point)[kDims]) {
-    const F8 order = voronoi_order<kDims>(point, local, settings);
-    const I8 is_first = order < first;
+    const F8 distance = voronoi_distance<kDims>(point, local, settings);
+    const I8 is_first = distance < first;
     if constexpr (kSecond) {
-      const I8 is_second = ~is_first & (order < second);
-      second = is_first ? first : is_second ? order : second;
+      const I8 is_second = ~is_first & (distance < second);
+      second = is_first ? first : is_second ? distance : second;
       assign_where(is_first, offset2, offset1);
       assign_where(is_first, point2, point1);
       assign_where(is_second, offset2, offset);
       assign_where(is_second, point2, point);
     }
-    first = is_first ? order : first;
+    first = is_first ? distance : first;
     assign_where(is_first, offset1, offset);
     assign_where(is_first, point1, point);
   });
-  const F8 order = kSecond ? second : first;
   Voronoi<kDims> out;
-  out.distance = order < most ? (squares ? sqrt(order) : order) : far;
+  out.distance = kSecond ? second : first;
   F8 at[kDims];
   for (int i = 0; i < kDims; ++i) {
     at[i] = cell[i] + (kSecond ? offset2[i] : offset1[i]);
