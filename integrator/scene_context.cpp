@@ -250,6 +250,7 @@ void SceneContext::make_views()
   globals.run_graph = stage_table_select().run_graph;
   globals.emitter_radiance = emitter_graph_radiance;
   globals.shadow_transmittance = stage_table_select().shadow_transmittance;
+  globals.shadow_surfaces = stage_table_select().shadow_surfaces;
   globals.lamps = scene.lamps.data();
   globals.lights.motions = motion.views();
   globals.textures = scene.textures->views().data();

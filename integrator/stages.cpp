@@ -303,6 +303,7 @@ const StageTable kTable = {
     finish,
     RELIEF_GRAPH_RUN,
     RELIEF_SHADOW_TRANSMITTANCE,
+    RELIEF_SHADOW_SURFACES,
 };
 
 }  // namespace

@@ -90,6 +90,7 @@ struct StageTable {
                  std::uint64_t& first_nonfinite);
   GraphRun run_graph;
   ShadowTransmittance shadow_transmittance;
+  ShadowSurfacesPass shadow_surfaces;
 };
 
 /// The interpreter of value graphs: see GraphRun.
@@ -132,6 +133,10 @@ void leave_surfaces_baseline(
     const KernelGlobals& g, PathState& state, const QueueView& queue, QueueView& next, ShadowQueue& shadow, Counters& counters);
 void leave_surfaces_avx2(
     const KernelGlobals& g, PathState& state, const QueueView& queue, QueueView& next, ShadowQueue& shadow, Counters& counters);
+
+/// See ShadowSurfacesPass.
+void shadow_surfaces_baseline(const KernelGlobals& g, const ShadowSurfaces& surfaces, Vec3f passes[8]);
+void shadow_surfaces_avx2(const KernelGlobals& g, const ShadowSurfaces& surfaces, Vec3f passes[8]);
 
 const StageTable& stage_table_baseline();
 const StageTable& stage_table_avx2();

@@ -25,6 +25,7 @@ struct BounceLimits {
 struct BsdfTables;  // kernel/bsdf/energy_tables.h
 struct KernelGlobals;
 struct MediumState;    // kernel/state/medium_state.h
+struct ShadowSurfaces;  // kernel/stage/shadow_surfaces.h
 struct ShadowWay;      // kernel/volume/shadow_way.h
 struct VaryingMedium;  // kernel/volume/varying_place.h
 
@@ -45,6 +46,9 @@ using EmitterRadiance = Vec3f (*)(const KernelGlobals& g, const Light& emitter, 
 using ShadowTransmittance =
     Vec3f (*)(const KernelGlobals& g, const MediumState& inside, const ShadowWay& way, float from, float to);
 
+/// What surfaces of one material let through of light: see shadow_surfaces_pass.
+using ShadowSurfacesPass = void (*)(const KernelGlobals& g, const ShadowSurfaces& surfaces, Vec3f passes[8]);
+
 struct KernelGlobals {
   const MeshView* meshes = nullptr;
   const InstanceView* instances = nullptr;
@@ -57,6 +61,7 @@ struct KernelGlobals {
   GraphRun run_graph = nullptr;
   EmitterRadiance emitter_radiance = nullptr;
   ShadowTransmittance shadow_transmittance = nullptr;
+  ShadowSurfacesPass shadow_surfaces = nullptr;
   const Lamp* lamps = nullptr;  ///< by Light::lamp_index
   GraphScene graph_scene;
   const TextureView* textures = nullptr;

@@ -392,27 +392,17 @@ RELIEF_KERNEL SurfaceParams graph_surface_params(Material m,
 }
 
 /// Opacity by a graph, finest texture level.
+/// @param lane  of the material's program
+/// @param hit   that it ran for
 RELIEF_KERNEL float graph_alpha(const Material& material,
-                                GraphRun run,
-                                const GraphProgramView& program,
+                                const GraphLane& lane,
                                 const TextureView* textures,
-                                const GraphPoint& at)
+                                const SurfaceHit& hit)
 {
-  GraphRegisters registers;
-  const GraphValues values = graph_values(graph_at_point(run, program, textures, at, registers));
-  return graph_surface_params<kFeatureTextures | kFeatureTransparency>(material, values, textures, *at.hit, at.uv_width)
+  constexpr float kFinest[2] = {0.0f, 0.0f};
+  return graph_surface_params<kFeatureTextures | kFeatureTransparency>(material, graph_values(lane), textures, hit,
+                                                                       kFinest)
       .alpha;
-}
-
-/// What a material's transparent closures let through, finest texture level.
-/// @param program  see Material::transparency_index
-RELIEF_KERNEL Vec3f graph_transparency(GraphRun run,
-                                       const GraphProgramView& program,
-                                       const TextureView* textures,
-                                       const GraphPoint& at)
-{
-  GraphRegisters registers;
-  return closures_transparency(graph_at_point(run, program, textures, at, registers));
 }
 
 }  // namespace relief

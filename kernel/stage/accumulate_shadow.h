@@ -25,7 +25,7 @@ RELIEF_KERNEL void accumulate_shadow(const KernelGlobals& g,
     MediumState& m = state.media[path];
     m.lit = m.lit + radiance_clamped(gain, g.clamp_direct);
   }
-  path_add_radiance(g, state, path, static_cast<int>(scatterings & ~kMediumRay), gain,
+  path_add_radiance(g, state, path, static_cast<int>(scatterings & kShadowScatterings), gain,
                     (scatterings & kMediumRay) != 0 ? LightRoad::kAskedInMedium : LightRoad::kAsked);
 }
 

@@ -69,7 +69,7 @@ RELIEF_KERNEL void path_set_ray(PathState& s, std::uint32_t i, Vec3f O, Vec3f D)
 /// @param t_max        metres
 /// @param cone         at O
 /// @param gain         of the path if nothing is in between: radiance × throughput, MIS weight included
-/// @param scatterings  events between the camera and the light, or kAmbientRay
+/// @param scatterings  of path_shadow_scatterings, or kAmbientRay
 RELIEF_KERNEL void shadow_queue_push(ShadowQueue& shadow,
                                      std::uint32_t path,
                                      Vec3f O,
@@ -88,6 +88,22 @@ RELIEF_KERNEL void shadow_queue_push(ShadowQueue& shadow,
   shadow.gain[ray] = gain;
   shadow.path[ray] = path;
   shadow.scatterings[ray] = scatterings;
+}
+
+/// What a shadow ray is told of its path, which may go on before the ray is traced: ShadowQueue::scatterings.
+/// @param scatterings  events between the camera and the light
+RELIEF_KERNEL std::uint32_t path_shadow_scatterings(const PathState& s, std::uint32_t i, int scatterings)
+{
+  constexpr std::uint32_t kMost = (kMediumRay >> kShadowTransparentShift) - 1u;
+  const std::uint32_t passed = s.flags[i] >> kPathTransparentShift;
+  return static_cast<std::uint32_t>(scatterings) | (passed < kMost ? passed : kMost) << kShadowTransparentShift;
+}
+
+/// Transparent surfaces before a shadow ray.
+RELIEF_KERNEL std::uint32_t shadow_ray_passed(const ShadowQueue& shadow, std::uint32_t ray)
+{
+  const std::uint32_t events = shadow.scatterings[ray];
+  return events != kAmbientRay ? (events & ~kMediumRay) >> kShadowTransparentShift : 0u;
 }
 
 /// What an event counts as, and where its count is. Of those in media only the sum of all events is told.

@@ -97,8 +97,9 @@ RELIEF_KERNEL void shade_medium_light_at(const KernelGlobals& g,
   shadow_ray_aim(light, answer.emitter, P, P, D, t_max);
   const RayCone cone =
       ray_cone_propagate({state.cone_width[path], state.cone_spread[path]}, state.t_min[path] + place.distance);
-  const auto bounces = static_cast<std::uint32_t>(path_bounces(state.bounces[path], BounceKind::kAll));
-  shadow_queue_push(shadow, path, P, D, t_max, cone, gain, (bounces + 1) | (bounces == 0 ? kMediumRay : 0u));
+  const int bounces = path_bounces(state.bounces[path], BounceKind::kAll);
+  shadow_queue_push(shadow, path, P, D, t_max, cone, gain,
+                    path_shadow_scatterings(state, path, bounces + 1) | (bounces == 0 ? kMediumRay : 0u));
 }
 
 /// Chance with which light is asked for on a stretch: always on what the camera sees, and else by what is scattered there, as thin

@@ -127,7 +127,10 @@ inline constexpr std::uint32_t kShadowEntries = 2 * kBatchPaths + 64 / 4;
 
 /// In place of `scatterings`: a ray that looks for ambient occlusion.
 inline constexpr std::uint32_t kAmbientRay = ~0u;
-/// With the number of scattering events: the first is in a medium.
+/// Within `scatterings`: the number of events, above it that of transparent surfaces that the path had passed, and whether the first
+/// event is in a medium.
+inline constexpr std::uint32_t kShadowScatterings = 0xffffu;
+inline constexpr int kShadowTransparentShift = 16;
 inline constexpr std::uint32_t kMediumRay = 1u << 31;
 
 /// Shadow rays of a batch: where to look, and what the path gains if nothing is in between.
@@ -138,8 +141,7 @@ struct alignas(64) ShadowQueue {
   float cone_width[kShadowEntries], cone_spread[kShadowEntries];  ///< ray cone at O
   PathColumn<Vec3f, kShadowEntries> gain;                         ///< radiance × throughput, MIS weight included
   std::uint32_t path[kShadowEntries];                             ///< whose
-  std::uint32_t scatterings
-      [kShadowEntries];  ///< events between the camera and the light, perhaps with kMediumRay; or kAmbientRay
+  std::uint32_t scatterings[kShadowEntries];  ///< events before the light, see kShadowScatterings; or kAmbientRay
   std::uint32_t size;                         ///< number of rays waiting
 };
 

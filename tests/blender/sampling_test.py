@@ -3,7 +3,20 @@
 import bpy
 import numpy as np
 
-from scenes import add_camera, add_light, add_plane, add_sphere, degrees, diffuse, folder, read_rgb, set_world
+from scenes import (
+    add_camera,
+    add_light,
+    add_plane,
+    add_sphere,
+    degrees,
+    diffuse,
+    folder,
+    new_scene,
+    read_rgb,
+    render,
+    set_bounces,
+    set_world,
+)
 
 
 def _material(kind, **inputs):
@@ -100,3 +113,29 @@ def test_a_noise_threshold_leaves_as_much_noise_as_in_cycles():
         ratios.append(errors[0] / errors[1])
         print(threshold, errors, ratios[-1])
     assert 0.75 < np.median(ratios) < 1.25, ratios
+
+
+def _under_sheets(count, from_above):
+    """A floor under sheets that are half transparent, seen from below or through them; four may be passed."""
+    scene = new_scene(16, 12)
+    scene.relief.use_cycles_settings = True
+    set_bounces(scene, 0)
+    scene.cycles.transparent_max_bounces = 4
+    add_plane(40, diffuse((0.8, 0.8, 0.8)))
+    sheet = _material("BsdfTransparent", Color=(0.9, 0.9, 0.9, 1))
+    for i in range(count):
+        add_plane(60, sheet, (0, 0, 2 + 0.5 * i))
+    add_light("SUN", (0, 0, 9), degrees(10, 0, 0), energy=3)
+    set_world((0, 0, 0))
+    add_camera((0, 0, 8 if from_above else 1))
+    with folder() as path:
+        return [render(scene, e, f"{path}/picture.exr", samples=8)[..., :3].mean() for e in ("RELIEF", "CYCLES")]
+
+
+def test_light_passes_as_many_surfaces_as_in_cycles():
+    """Each of them was passed, however many there were."""
+    for count, from_above in ((0, False), (4, False), (5, False), (2, True), (3, True), (4, True)):
+        relief, cycles = _under_sheets(count, from_above)
+        # Suns are disks: of their edge noise is left.
+        assert abs(relief - cycles) <= 0.01 * cycles, (count, from_above, relief, cycles)
+        assert (cycles > 0) == (2 * count <= 4 if from_above else count <= 4), (count, from_above, cycles)
