@@ -125,14 +125,22 @@ RELIEF_KERNEL std::uint32_t path_ray_kind(std::uint32_t flags)
 
 RELIEF_KERNEL std::uint32_t path_flags_after(std::uint32_t flags, PathEvent event)
 {
-  return (flags & ~(3u << kPathEventShift | kPathScattered)) | static_cast<std::uint32_t>(event) << kPathEventShift;
+  return (flags & ~(3u << kPathEventShift | kPathScattered | kPathTranslucent)) |
+         static_cast<std::uint32_t>(event) << kPathEventShift;
+}
+
+/// Whether the present ray started from a diffuse lobe of a surface, on either side.
+RELIEF_KERNEL bool path_is_after_diffuse(std::uint32_t flags)
+{
+  return (flags & kPathScattered) == 0 &&
+         (path_event(flags) == static_cast<std::uint32_t>(PathEvent::kDiffuse) || (flags & kPathTranslucent) != 0);
 }
 
 /// Microfacets that a path does not see: after a diffuse event those by which there are to be no caustics.
 /// @return  bits PathEvent
 RELIEF_KERNEL std::uint32_t path_does_without(const KernelGlobals& g, std::uint32_t flags)
 {
-  return path_event(flags) == static_cast<std::uint32_t>(PathEvent::kDiffuse) ? g.caustics.switched_off : 0;
+  return path_is_after_diffuse(flags) ? g.caustics.switched_off : 0;
 }
 
 /// Whether bits PathEvent have that of light that microfacets send on.

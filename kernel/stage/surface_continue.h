@@ -113,6 +113,7 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
   state.flags[path] = path_flags_after(state.flags[path], transmitted ? PathEvent::kTransmission
                                                           : diffuse   ? PathEvent::kDiffuse
                                                                       : PathEvent::kGlossy);
+  if (transmitted && diffuse) state.flags[path] |= kPathTranslucent;
   const bool is_clear = transmitted && !diffuse && bsdf.roughness <= g.clear_alpha;
   if (!is_clear) state.flags[path] |= kPathCovers;
   const RayCone cone = ray_cone_scatter(event.cone, bsdf.roughness);

@@ -215,7 +215,7 @@ RELIEF_KERNEL std::uint32_t path_ray_kinds(const PathState& state, std::uint32_t
   if ((state.flags[path] & kPathScattered) != 0) return blurred;
   const std::uint32_t side =
       bit(event == PathEvent::kTransmission ? GraphRayKind::kTransmission : GraphRayKind::kReflection) | blurred;
-  if (event == PathEvent::kDiffuse) return side | bit(GraphRayKind::kDiffuse);
+  if (path_is_after_diffuse(state.flags[path])) return side | bit(GraphRayKind::kDiffuse);
   return side | bit(GraphRayKind::kGlossy) | (state.pdf[path] > 0.0f ? 0u : bit(GraphRayKind::kSingular));
 }
 

@@ -119,7 +119,8 @@ enum PathFlag : std::uint32_t {
   kPathCovers = 1u << 13,      ///< an event after which the film is not clear, whatever is seen behind it
   kPathScattered = 1u << 14,   ///< the last scattering event was in a medium: the two bits of PathEvent mean nothing
   kPathLast = 1u << 15,        ///< it has scattered in media as often as it may: what it meets is seen, but not lit
-  kPathTransparentShift = 16,  ///< position of the count of transparent surfaces
+  kPathTranslucent = 1u << 16,  ///< PathEvent::kTransmission was by a diffuse lobe
+  kPathTransparentShift = 17,   ///< position of the count of transparent surfaces
 };
 
 /// Entries of a column of shadow rays. A camera path's first hit may ask for a second one, for ambient occlusion.

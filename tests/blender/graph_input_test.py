@@ -698,3 +698,41 @@ def test_lengths_and_depths_of_shadow_rays():
 def test_depths_of_diffuse_rays():
     assert_agrees(_transparent_by("Diffuse Depth", 0.5), runs=4, samples=16)
     assert_agrees(_transparent_by("Is Diffuse Ray", 0.8), runs=4, samples=16)
+
+
+def _lit_by_kinds_of_rays(kind, **inputs):
+    """A sheet between two plates that emit by what kind of ray sees them, the upper one behind the camera."""
+    scene = new_scene(24, 18)
+    set_bounces(scene, 2)
+    plate, tree, emission = new_material("plate", "ShaderNodeEmission")
+    path, total = tree.nodes.new("ShaderNodeLightPath"), None
+    kinds = ("Is Diffuse Ray", "Is Transmission Ray", "Is Reflection Ray", "Is Glossy Ray", "Is Singular Ray")
+    for i, name in enumerate(kinds):
+        # Sums of powers of two are told apart.
+        node = tree.nodes.new("ShaderNodeMath")
+        node.operation, node.inputs[1].default_value = "MULTIPLY_ADD", 2.0**-i
+        tree.links.new(path.outputs[name], node.inputs[0])
+        if total is None:
+            node.inputs[2].default_value = 0.1
+        else:
+            tree.links.new(total, node.inputs[2])
+        total = node.outputs[0]
+    tree.links.new(total, emission.inputs["Strength"])
+    add_plane(8, new_material("sheet", kind, **inputs)[0])
+    for height in (-1, 4):
+        add_plane(60, plate, (0, 0, height))
+    set_world((0, 0, 0))
+    add_camera((0, -1.5, 1.5), (math.radians(45), 0, 0))
+    return scene
+
+
+def test_rays_are_told_what_lobe_they_left():
+    """Behind translucent sheets they were no diffuse rays, so that panes for diffuse rays let the sun in twice."""
+    for kind, inputs in (
+        ("ShaderNodeBsdfDiffuse", {}),
+        ("ShaderNodeBsdfTranslucent", {}),
+        ("ShaderNodeBsdfGlossy", {"Roughness": 0.3}),
+        ("ShaderNodeBsdfRefraction", {"Roughness": 0.3}),
+        ("ShaderNodeBsdfVelvet" if hasattr(bpy.types, "ShaderNodeBsdfVelvet") else "ShaderNodeBsdfSheen", {}),
+    ):
+        assert_agrees(_lit_by_kinds_of_rays(kind, **inputs), runs=4, samples=16)
