@@ -140,6 +140,29 @@ void shade_group(const KernelGlobals& g,
   }
 }
 
+/// Sends on those paths of a group that meet nothing but what lets them through whole, as most do that meet an image of a leaf: no
+/// lobes, lights or films are asked.
+/// @return  lanes of the others, bit by bit
+unsigned pass_clear(const KernelGlobals& g, PathState& state, const SurfaceGroup& group, const SurfaceSinks& sinks)
+{
+  unsigned others = group.registers.used;
+  if (const Material& material = *group.at[0].material;
+      material.transparency_index < 0 || !is_zero(material.emission)) {
+    return others;
+  }
+  const unsigned clear = closures_clear(group.program, group.registers);
+  for (int k = 0; k < group.count; ++k) {
+    if ((clear >> k & 1u) == 0 || (group.at[k].instance->flags & kHoldout) != 0) continue;
+    const Vec3f passes = closures_transparency({&group.program, &group.registers, k});
+    if (!(max_component(passes) > 0.0f)) continue;
+    others &= ~(1u << k);
+    sinks.counters.surface_hits += 1;
+    sinks.counters.transparent_hits += 1;
+    if (path_pass_through(g, state, group.paths[k], passes)) queue_push(sinks.next, group.paths[k]);
+  }
+  return others;
+}
+
 /// Runs the graphs of up to eight paths that have hit one material, then shades them.
 template <unsigned kFeatures>
 void shade_surfaces_by_graph(const KernelGlobals& g,
@@ -178,8 +201,19 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
     g.run_graph(program, g.textures, registers);
     sinks.counters.graph_runs += 1;
     sinks.counters.graph_points += count;
-    shade_group<kFeatures>(g, state, {queue.paths + first, static_cast<int>(count), located, program, registers}, hits,
-                           sinks);
+    const SurfaceGroup group{queue.paths + first, static_cast<int>(count), located, program, registers};
+    if constexpr ((kFeatures & kFeatureMixture) != 0) {
+      const unsigned all = registers.used, others = pass_clear(g, state, group, sinks);
+      if (others != all) {
+        for (int k = 0; k < group.count; ++k) {
+          if ((others >> k & 1u) == 0) continue;
+          const GraphHit hit{{&program, &registers, k}};
+          shade_surface<kFeatures>(g, state, group.paths[k], located[k], sinks, &hit);
+        }
+        continue;
+      }
+    }
+    shade_group<kFeatures>(g, state, group, hits, sinks);
   }
 }
 

@@ -230,6 +230,19 @@ RELIEF_KERNEL Vec3f closures_transparency(const GraphLane& at)
   return sum;
 }
 
+/// Lanes at which nothing but transparent closures weighs, bit by bit.
+RELIEF_KERNEL unsigned closures_clear(const GraphProgramView& program, const GraphRegisters& registers)
+{
+  I8 weighs{};
+  for (std::uint32_t i = 0; i < program.num_closures; ++i) {
+    const SurfaceClosureSpec& spec = program.closures[i];
+    if (spec.kind != ClosureKind::transparent) {
+      weighs |= graph_result_lanes(program, registers, spec.first_result) > kLeastClosureWeight;
+    }
+  }
+  return ~mask_of(weighs) & registers.used;
+}
+
 /// What emission closures alone send out.
 RELIEF_KERNEL Vec3f closures_emission(const GraphLane& at)
 {
