@@ -123,7 +123,7 @@ RELIEF_KERNEL Vec3f phase_of_scattered(Vec3f f, Vec3f sigma_s)
   }
   const Vec3f phase = phase_of_scattered(media_eval(media, at.D, octahedral_decode(photon.wi)).f, media.sigma_s);
   if (is_zero(phase)) return;
-  const Vec3f left = medium_walk_transmittance(g, walk, ray);
+  const Vec3f left = medium_ray_transmittance(g, walk, ray, walk.numbers);
   medium_photons_add(
       g, state, path,
       path_throughput(state, path) * photon.power * phase * left * (kernel * (total / share) * (2.0f * kInvPi)));
@@ -182,7 +182,7 @@ RELIEF_KERNEL Vec3f photon_medium_even(const KernelGlobals& g,
 {
   MediumWalk walk = medium_walk_make(g, state.media[path], at.O, at.D, at.length, medium_seed(at));
   const GraphRay ray = medium_graph_ray(state, path);
-  if (!photon_shows_in_media(g, state, path)) return medium_walk_transmittance(g, walk, ray);
+  if (!photon_shows_in_media(g, state, path)) return medium_ray_transmittance(g, walk, ray, walk.numbers);
   const Vec3f throughput = path_throughput(state, path);
   medium_walk_sample(walk, counted_next(walk.numbers));
   Vec3f left{1, 1, 1}, kept;

@@ -14,25 +14,10 @@
 #include <cmath>
 #include <new>
 
-#include "kernel/math/lanes.h"
-#include "kernel/sample/sobol.h"
-#include "kernel/state/medium_state.h"
 #include "kernel/volume/distance.h"
-#include "kernel/volume/shadow_way.h"
-#include "kernel/volume/varying_medium.h"
+#include "kernel/volume/medium_flight.h"
 
 namespace relief {
-
-/// Random numbers by a count, for places of which there is no telling how many there are.
-struct CountedNumbers {
-  std::uint32_t state = 0;
-};
-
-RELIEF_KERNEL float counted_next(CountedNumbers& numbers)
-{
-  numbers.state = numbers.state * 747796405u + 2891336453u;
-  return unit_float(hash_mix_32(numbers.state));
-}
 
 /// A part of a walk in which the media are taken for even.
 struct WalkStretch {
@@ -55,15 +40,9 @@ struct WalkPlace {
   float t = kInfinity;  ///< metres; infinite: it has left
 };
 
-/// The media along a part of a ray.
-struct MediumWalk {
+/// A walk along a part of a ray.
+struct MediumWalk : MediumRay {
   MediumWalk() {}
-  Vec3f O, D;
-  float length = 0;  ///< metres; may be infinite
-  MediaSum even;     ///< those that are even
-  std::int32_t instances[kMostMedia];
-  const VaryingMedium* media[kMostMedia];  ///< those that vary
-  int size = 0;
   union {  // of which the first num_stretches are there
     WalkStretch stretches[kMostStretches];
   };
@@ -79,28 +58,6 @@ struct MediumWalk {
   WalkPlace at;  ///< the last of all these
   CountedNumbers numbers;
 };
-
-RELIEF_KERNEL std::int32_t medium_of_instance(const KernelGlobals& g, std::int32_t instance)
-{
-  return instance == kWholeWorld ? g.world_medium : g.materials[g.instances[instance].material_index].medium_index;
-}
-
-/// What an instance, or the world, is filled with that varies; null: nothing.
-RELIEF_KERNEL const VaryingMedium* medium_that_varies(const KernelGlobals& g, std::int32_t instance)
-{
-  const VaryingMedium& medium = g.varying_media[medium_of_instance(g, instance)];
-  return medium.num_closures > 0 && varying_place(medium, instance).rates.boxes != nullptr ? &medium : nullptr;
-}
-
-/// Whether one of the media that a point is in varies.
-RELIEF_KERNEL bool media_vary(const KernelGlobals& g, const MediumState& m)
-{
-  if (g.varying_media == nullptr) return false;
-  for (int i = 0; i < m.size; ++i) {
-    if (medium_that_varies(g, m.inside[i]) != nullptr) return true;
-  }
-  return false;
-}
 
 /// Makes one of every two stretches.
 RELIEF_KERNEL void walk_join(MediumWalk& walk)
@@ -139,118 +96,11 @@ RELIEF_KERNEL void walk_add(MediumWalk& walk, float end, const RateBox& box)
   stretch.box.shows = box.shows;
 }
 
-/// Finds the stretches of a walk through one grid of one level. Which side of a box a ray leaves by is not to be foretold, so this does not
-/// branch by it.
-/// @param even  what is everywhere besides
-RELIEF_KERNEL void walk_find_in_grid(MediumWalk& walk, const RateGrid& grid, const RateBox& even)
-{
-  using F4 [[gnu::vector_size(16)]] = float;
-  using I4 [[gnu::vector_size(16)]] = std::int32_t;
-  const Vec3f D = walk.D / grid.cell, O = (walk.O - rate_grid_middle(grid)) / grid.cell;
-  const float half = 0.5f * static_cast<float>(grid.size), from[3] = {O.x, O.y, O.z}, to[3] = {D.x, D.y, D.z};
-  float enters = 0, leaves = walk.length;
-  for (int i = 0; i < 3; ++i) {
-    if (to[i] == 0.0f) {
-      if (!(__builtin_fabsf(from[i]) <= half)) leaves = 0;
-      continue;
-    }
-    const float inverse = 1.0f / to[i], a = (-half - from[i]) * inverse, b = (half - from[i]) * inverse;
-    enters = max(enters, min(a, b));
-    leaves = min(leaves, max(a, b));
-  }
-  if (!(enters < leaves)) return walk_add(walk, walk.length, even);
-  if (enters > 0.0f) walk_add(walk, enters, even);
-  // Where the ray gets to along each axis next, and what that changes; of lane 3 and of axes that it does not go along: never.
-  F4 border{}, origin{}, inverse{}, step{};
-  std::ptrdiff_t strides[3];
-  border += kInfinity;
-  inverse += 1.0f;
-  const RateBox* box = grid.boxes;
-  std::ptrdiff_t stride = 1;
-  for (int i = 0; i < 3; ++i, stride *= grid.size) {
-    const int n = static_cast<int>(clamp(from[i] + to[i] * enters + half, 0.0f, 2.0f * half - 1.0f));
-    const bool up = to[i] > 0.0f;
-    box += stride * n;
-    strides[i] = up ? stride : -stride;
-    if (to[i] == 0.0f) continue;
-    border[i] = static_cast<float>(up ? n + 1 : n) - half;
-    origin[i] = from[i];
-    inverse[i] = 1.0f / to[i];
-    step[i] = up ? 1.0f : -1.0f;
-  }
-  std::ptrdiff_t moves[8];
-  for (int i = 0; i < 8; ++i) {
-    moves[i] = (i & 1 ? strides[0] : 0) + (i & 2 ? strides[1] : 0) + (i & 4 ? strides[2] : 0);
-  }
-  for (float t = enters;;) {
-    // The same sum as that by which it leaves the grid: no box is beyond.
-    const F4 next = (border - origin) * inverse;
-    const float end = min(min(next[0], next[1]), next[2]);
-    const float until = min(end, leaves);
-    if (until > t) {
-      walk_add(walk, until, {box->sigma_t + even.sigma_t, box->residual + even.residual, box->shows + even.shows});
-      t = until;
-    }
-    if (!(end < leaves)) break;
-    const I4 crosses = next == F4{} + end;
-    border += __builtin_bit_cast(F4, __builtin_bit_cast(I4, step) & crosses);
-    box += moves[_mm_movemask_ps(__builtin_bit_cast(__m128, crosses)) & 7];
-  }
-  if (leaves < walk.length) walk_add(walk, walk.length, even);
-}
-
-/// Finds the stretches of a walk.
-RELIEF_KERNEL void walk_find(MediumWalk& walk)
-{
-  RateBox even{walk.even.sigma_t, 0.0f, max_component(walk.even.sigma_t)};
-  // What only shines needs samples as well; on an infinite way it has no radiance.
-  if (!is_zero(walk.even.emission) && !(even.shows > 0.0f)) {
-    if (walk.length < kInfinity)
-      even.shows = 1.0f / walk.length;
-    else
-      walk.even.emission = {};
-  }
-  if (walk.size == 1) {
-    const RateGrid& grid = varying_place(*walk.media[0], walk.instances[0]).rates;
-    if (grid.num_levels == 1) return walk_find_in_grid(walk, grid, even);
-  }
-  struct Ways {
-    Ways() {}
-    union {
-      RateWay of[kMostMedia];
-    };
-  } ways;
-  for (int i = 0; i < walk.size; ++i) {
-    ways.of[i] = rate_way_make(varying_place(*walk.media[i], walk.instances[i]).rates, walk.O, walk.D);
-  }
-  for (float t = 0; t < walk.length;) {
-    float end = walk.length;
-    RateBox box = even;
-    for (int i = 0; i < walk.size; ++i) {
-      const RateWay& way = ways.of[i];
-      end = min(end, way.end);
-      if (way.box == nullptr) continue;
-      box.sigma_t += way.box->sigma_t;
-      box.residual += way.box->residual;
-      box.shows += way.box->shows;
-    }
-    if (end > t) walk_add(walk, end, box);
-    t = end;
-    for (int i = 0; i < walk.size; ++i) {
-      if (!(ways.of[i].end > t)) rate_way_go(ways.of[i]);
-    }
-  }
-}
-
 /// Collisions that are wanted on a ray at least, on average, where what they correct is large enough to be seen.
 inline constexpr float kWantedCollisions = 3.0f;
 /// And where it is not, of the square of its optical depth, which is what the noise is made of. 20 to 100 gave the same noise for its
 /// time.
 inline constexpr float kCollisionsOfSquare = 20.0f;
-
-/// Optical depth up to a collision.
-/// @param u  [0, 1), a multiple of 2⁻²⁴: what is left to 1 is exact
-RELIEF_KERNEL float free_depth(float u) { return -__builtin_logf(1.0f - u); }
 
 /// How much of what a place goes by is in a stretch.
 struct WalkPart {
@@ -290,6 +140,15 @@ RELIEF_KERNEL void walk_collide(MediumWalk& walk)
   });
 }
 
+/// Finds the stretches of a walk.
+RELIEF_KERNEL void walk_find(MediumWalk& walk)
+{
+  rate_boxes_visit(walk, [&walk](float end, const RateBox& box) {
+    walk_add(walk, end, box);
+    return true;
+  });
+}
+
 /// @param D  unit
 RELIEF_KERNEL MediumWalk
 medium_walk_make(const KernelGlobals& g, const MediumState& m, Vec3f O, Vec3f D, float length, std::uint32_t seed)
@@ -299,15 +158,7 @@ medium_walk_make(const KernelGlobals& g, const MediumState& m, Vec3f O, Vec3f D,
   walk.D = D;
   walk.length = length;
   walk.numbers.state = seed;
-  for (int i = 0; i < m.size; ++i) {
-    const VaryingMedium* varying = medium_that_varies(g, m.inside[i]);
-    if (varying == nullptr) {
-      media_add(walk.even, g.media[medium_of_instance(g, m.inside[i])]);
-    } else {
-      walk.instances[walk.size] = m.inside[i];
-      walk.media[walk.size++] = varying;
-    }
-  }
+  medium_ray_enter(g, m, walk);
   walk_find(walk);
   float start = 0, residual = 0;
   Vec3f depth;
@@ -330,12 +181,6 @@ medium_walk_make(const KernelGlobals& g, const MediumState& m, Vec3f O, Vec3f D,
     walk_collide(walk);
   }
   return walk;
-}
-
-/// Share of light that is left after an optical depth.
-RELIEF_KERNEL Vec3f depth_transmittance(Vec3f depth)
-{
-  return {std::exp(-depth.x), std::exp(-depth.y), std::exp(-depth.z)};
 }
 
 /// Samples of a stretch. Light fades as 1 / (1 + depth) in each for them, which is near enough to an exponential.
@@ -521,41 +366,6 @@ RELIEF_KERNEL void medium_walk_correct(MediumWalk& walk, const MediumPlaces& pla
   if (!(places.corrects[k] > 0.0f)) return;
   left *= Vec3f{1, 1, 1} - (sigma_t - places.taken[k]) / places.corrects[k];
   if (!is_zero(left)) left *= medium_walk_survive(walk, left * places.passes[k]);
-}
-
-/// Share of light that media let through, as a random number of that mean.
-RELIEF_KERNEL Vec3f medium_walk_transmittance(const KernelGlobals& g, MediumWalk& walk, const GraphRay& ray)
-{
-  const Vec3f passes = depth_transmittance(walk.depth);
-  if (!(walk.collision.t < walk.length)) return passes;
-  Vec3f left = splat3(medium_walk_survive(walk, passes));
-  MediumPlaces places;
-  for (bool goes_on = true; goes_on && !is_zero(left);) {
-    goes_on = medium_walk_next(g, walk, ray, places);
-    for (int k = 0; k < places.size && !is_zero(left); ++k) {
-      medium_walk_correct(walk, places, k, medium_place_media(walk, places, k).sigma_t, left);
-    }
-  }
-  return is_zero(left) ? left : left * passes;
-}
-
-/// See ShadowTransmittance.
-RELIEF_KERNEL Vec3f media_shadow_transmittance(const KernelGlobals& g,
-                                               const MediumState& inside,
-                                               const ShadowWay& way,
-                                               float from,
-                                               float to)
-{
-  if (!media_vary(g, inside)) {
-    Vec3f sigma_t;
-    for (int i = 0; i < inside.size; ++i) sigma_t += g.media[medium_of_instance(g, inside.inside[i])].sigma_t;
-    return medium_transmittance(sigma_t, to - from);
-  }
-  if (!(to > from)) return {1, 1, 1};
-  const auto number = __builtin_bit_cast(std::uint32_t, from);
-  MediumWalk walk =
-      medium_walk_make(g, inside, way.O + way.D * from, way.D, to - from, hash_mix_32(way.seed ^ hash_mix_32(number)));
-  return medium_walk_transmittance(g, walk, way.ray);
 }
 
 }  // namespace relief

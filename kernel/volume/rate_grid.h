@@ -14,6 +14,7 @@ struct RateBox {
   Vec3f sigma_t;       ///< 1/m: what it is taken for
   float residual = 0;  ///< 1/m: tentative collisions by which that is corrected
   float shows = 0;     ///< 1/m: how often it is asked what it scatters and sends out
+  float most = 0;      ///< 1/m: tentative collisions of what is scattered or passes; it is best if sigma_t is not more
 };
 
 /// Boxes in nested levels: those of each are twice as long as those of the one before, about the same middle. Outside of the last

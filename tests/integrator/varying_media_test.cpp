@@ -256,41 +256,67 @@ TEST(VaryingMedia, WithoutBoundsAreWarnedAboutAndRight)
 }
 
 /// Rays through a density by what it is taken for.
-class MediumWalkIn : public testing::TestWithParam<RateBox> {};
+class MediumWalkIn : public testing::TestWithParam<RateBox> {
+ protected:
+  /// Compares means of rays through a density of 1 + z / 2, of which `albedo` scatters, from z = 1 to −1.
+  /// @param values  (globals, media, seed) -> two numbers
+  template <typename Values>
+  static void expect_means(double albedo, const double (&expected)[2], const Values& values)
+  {
+    Scene scene = view();
+    Varying v;
+    const GraphScalar color = v.number(albedo), black = v.number(0);
+    v.add(VolumeClosureKind::kScatter, {color, color, color, v.z(0.5, 1), black});
+    const GraphScalar rest = v.number(albedo);
+    v.add(VolumeClosureKind::kAbsorption, {rest, rest, rest, v.z(0.5, 1)});
+    add_varying(scene, box_mesh({1, 1, 1}), v.program());
+    const SceneContext context(scene);
+    VaryingMedium medium = context.globals.varying_media[0];
+    VaryingPlace place = varying_place(medium, 0);
+    const auto size = static_cast<std::size_t>(place.rates.size);
+    const std::vector<RateBox> boxes(size * size * size, GetParam());
+    place.rates.boxes = boxes.data();
+    medium.places = &place;
+    const std::int32_t first = 0;
+    medium.place_of_instance = &first;
+    KernelGlobals g = context.globals;
+    g.varying_media = &medium;
+    MediumState inside{};
+    inside.inside[0] = 0;
+    inside.size = 1;
+    double sum[2] = {}, squares[2] = {};
+    constexpr int kSamples = 200000;
+    for (int i = 0; i < kSamples; ++i) {
+      const std::array<double, 2> got = values(g, inside, static_cast<std::uint32_t>(i));
+      for (std::size_t which = 0; which < 2; ++which) {
+        sum[which] += got[which];
+        squares[which] += got[which] * got[which];
+      }
+    }
+    for (int which = 0; which < 2; ++which) {
+      const double mean = sum[which] / kSamples;
+      const double error = std::sqrt((squares[which] / kSamples - mean * mean) / kSamples);
+      EXPECT_NEAR(mean, expected[which], kQuantile * error) << which;
+      EXPECT_LT(error, 0.01);
+    }
+  }
+};
+
+constexpr Vec3f kRayStart{0.1f, 0.2f, 1}, kRayDown{0, 0, -1};
 
 TEST_P(MediumWalkIn, HasTheRightMeanHoweverWrongThatIs)
 {
-  Scene scene = view();
-  Varying v;
-  v.add(VolumeClosureKind::kAbsorption, {v.number(0), v.number(0), v.number(0), v.z(0.5, 1)});
-  add_varying(scene, box_mesh({1, 1, 1}), v.program());
-  const SceneContext context(scene);
-  VaryingMedium medium = context.globals.varying_media[0];
-  VaryingPlace place = varying_place(medium, 0);
-  const auto size = static_cast<std::size_t>(place.rates.size);
-  const std::vector<RateBox> boxes(size * size * size, GetParam());
-  place.rates.boxes = boxes.data();
-  medium.places = &place;
-  const std::int32_t first = 0;
-  medium.place_of_instance = &first;
-  KernelGlobals g = context.globals;
-  g.varying_media = &medium;
-  MediumState inside{};
-  inside.inside[0] = 0;
-  inside.size = 1;
-  // What is let through of a density 1 + z / 2, and its integral times that.
+  // What is let through, and the integral of the density times that.
   const double expected[2] = {std::exp(-2.0), 1 - std::exp(-2.0)};
-  double sum[2] = {}, squares[2] = {};
-  constexpr int kSamples = 200000;
-  for (int i = 0; i < kSamples; ++i) {
-    const auto seed = static_cast<std::uint32_t>(i);
-    MediumWalk walk = medium_walk_make(g, inside, {0.1f, 0.2f, 1}, {0, 0, -1}, 2, seed);
+  expect_means(0, expected, [](const KernelGlobals& g, const MediumState& inside, std::uint32_t seed) {
+    CountedNumbers numbers{seed};
+    const MediumRay ray = medium_ray_make(g, inside, kRayStart, kRayDown, 2);
+    const auto passes = static_cast<double>(medium_ray_transmittance(g, ray, {}, numbers).x);
+    MediumWalk sampled = medium_walk_make(g, inside, kRayStart, kRayDown, 2, seed);
     // So that there are places of more density than collisions.
-    walk.factor = 1;
-    walk.collision = {};
-    walk_collide(walk);
-    const double passes = static_cast<double>(medium_walk_transmittance(g, walk, {}).x);
-    MediumWalk sampled = medium_walk_make(g, inside, {0.1f, 0.2f, 1}, {0, 0, -1}, 2, seed);
+    sampled.factor = 1;
+    sampled.collision = {};
+    walk_collide(sampled);
     medium_walk_sample(sampled, unit_float(hash_mix_32(seed + 77u)));
     medium_walk_approach(sampled, equiangular_make(sampled.O, sampled.D, 2, {0.4f, 0, 0.3f}),
                          unit_float(hash_mix_32(seed + 99u)));
@@ -305,27 +331,30 @@ TEST_P(MediumWalkIn, HasTheRightMeanHoweverWrongThatIs)
         medium_walk_correct(sampled, places, k, splat3(sigma_t), left);
       }
     }
-    const double values[2] = {passes, taken};
-    for (int which = 0; which < 2; ++which) {
-      sum[which] += values[which];
-      squares[which] += values[which] * values[which];
-    }
-  }
-  for (int which = 0; which < 2; ++which) {
-    const double mean = sum[which] / kSamples;
-    const double error = std::sqrt((squares[which] / kSamples - mean * mean) / kSamples);
-    EXPECT_NEAR(mean, expected[which], kQuantile * error) << which;
-    EXPECT_LT(error, 0.01);
-  }
+    return std::array{passes, taken};
+  });
+}
+
+TEST_P(MediumWalkIn, FliesAsOftenAsItScattersAndPasses)
+{
+  const double albedo = 0.7, expected[2] = {std::exp(-2.0), albedo * (1 - std::exp(-2.0))};
+  expect_means(albedo, expected, [](const KernelGlobals& g, const MediumState& inside, std::uint32_t seed) {
+    CountedNumbers numbers{seed};
+    MediumFlight flight;
+    const MediumRay ray = medium_ray_make(g, inside, kRayStart, kRayDown, 2);
+    medium_fly(g, ray, {}, numbers, {1, 1, 1}, flight);
+    if (!flight.scatters) return std::array{static_cast<double>(flight.left.x), 0.0};
+    return std::array{0.0, static_cast<double>(flight.left.x * flight_media(ray, flight).sigma_s.x)};
+  });
 }
 
 INSTANTIATE_TEST_SUITE_P(Boxes,
                          MediumWalkIn,
-                         testing::Values(RateBox{{0, 0, 0}, 1, 1},           // collisions alone, too few
-                                         RateBox{{1, 1, 1}, 0.6f, 1},        // the mean
-                                         RateBox{{2, 2, 2}, 1, 0.2f},        // too dense
-                                         RateBox{{0.5f, 0.5f, 0.5f}, 2, 3},  // too thin
-                                         RateBox{{0.5f, 0.5f, 0.5f}, 2, 0}));
+                         testing::Values(RateBox{{0, 0, 0}, 1, 1, 2},           // collisions alone, too few
+                                         RateBox{{1, 1, 1}, 0.6f, 1, 1.5f},     // the mean
+                                         RateBox{{2, 2, 2}, 1, 0.2f, 1},        // too dense, and flights too long
+                                         RateBox{{0.5f, 0.5f, 0.5f}, 2, 3, 4},  // too thin
+                                         RateBox{{0.5f, 0.5f, 0.5f}, 2, 0, 1.2f}));
 
 TEST(VaryingMedia, AreNowhereFartherFromWhatTheyAreTakenForThanTheirBounds)
 {
@@ -359,6 +388,7 @@ TEST(VaryingMedia, AreNowhereFartherFromWhatTheyAreTakenForThanTheirBounds)
       ASSERT_LE(max_component(abs(media[k].sigma_t - box.sigma_t)), 10 * box.residual * 1.0001f)
           << P[k].x << " " << P[k].y;
       ASSERT_GE(box.shows, 0.1f * max_component(media[k].sigma_t) * 0.9999f);
+      ASSERT_GE(box.most, 0.2f * max_component(media[k].sigma_t) * 0.9999f);
     }
   }
 }

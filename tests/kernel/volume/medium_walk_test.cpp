@@ -97,7 +97,10 @@ TEST(MediumWalk, GoesThroughTheBoxesThatItIsIn)
     walk.O = {O[0], O[1], O[2]};
     walk.D = normalize(Vec3f{D[0], D[1], D[2]});
     walk.length = ray % 4 == 0 ? kInfinity : unit(random) * 60.0f;
-    walk_find_in_grid(walk, grid, even);
+    rate_boxes_visit_in_grid(walk, grid, even, [&walk](float end, const RateBox& box) {
+      walk_add(walk, end, box);
+      return true;
+    });
     ASSERT_GT(walk.num_stretches, 0);
     EXPECT_EQ(walk.stretches[walk.num_stretches - 1].end, walk.length);
     double start = 0;
