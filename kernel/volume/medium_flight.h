@@ -13,6 +13,7 @@
 
 #include "kernel/math/lanes.h"
 #include "kernel/sample/sobol.h"
+#include "kernel/volume/distance.h"
 #include "kernel/volume/medium_ray.h"
 #include "kernel/volume/shadow_way.h"
 
