@@ -1,10 +1,12 @@
-"""Ten more scenes, as those of scenes.py, which writes them."""
+"""Eleven more scenes, as those of scenes.py, which writes them."""
 
 import math
 import random
 
 import bpy
+import numpy as np
 import stage
+from mathutils import Euler, Vector
 from stage import NodeTree
 
 
@@ -259,6 +261,53 @@ def macro():
     stage.camera((0.25, -1.5, 0.65), (0.0, -0.09, 0.13), 75, fstop=1.4)
 
 
+def _leaf():
+    """A leaf that is an image on a square, clear around its shape."""
+    across, along = np.meshgrid(np.linspace(0, 1, 256), np.linspace(0, 1, 256))
+    shape = (across - 0.5) ** 2 / 0.04 + (along - 0.5) ** 2 / 0.2 < 1
+    pixels = np.stack((0.1 + 0.05 * np.sin(40 * across), 0.35 + 0.2 * along, 0.05 + 0 * along, shape), -1)
+    image = bpy.data.images.new("leaf", 256, 256, alpha=True)
+    image.pixels.foreach_set(pixels.astype(np.float32).ravel())
+    image.pack()
+    t = NodeTree("leaf")
+    look = t.node("TexImage")
+    look.image = image
+    shader = t.node("BsdfPrincipled", {"Base Color": look.outputs[0], "Alpha": look.outputs[1]})
+    return t.end(shader.outputs[0])
+
+
+def forest():
+    stage.begin((0.5, 0.6, 0.8), 1.0)
+    stage.add("plane", stage.plastic("ground", (0.2, 0.25, 0.1), 0.9), size=80)
+    chance = random.Random(2)
+    points, faces = [], []
+    for _ in range(2500):
+        middle = [chance.gauss(0, 0.7), chance.gauss(0, 0.7), 2.6 + chance.gauss(0, 0.6)]
+        turn = Euler([chance.uniform(0, math.tau) for _ in range(3)])
+        for corner in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
+            place = Vector((0.12 * corner[0], 0.12 * corner[1], 0))
+            place.rotate(turn)
+            points.append([a + b for a, b in zip(middle, place)])
+        faces.append(range(len(points) - 4, len(points)))
+    mesh = bpy.data.meshes.new("crown")
+    mesh.from_pydata(points, [], faces)
+    places = mesh.uv_layers.new().data
+    for i, place in enumerate(places):
+        place.uv = ((0, 0), (1, 0), (1, 1), (0, 1))[i % 4]
+    mesh.materials.append(_leaf())
+    crown = stage.link(mesh, "crown")
+    trunk = stage.turned(stage.plastic("bark", (0.2, 0.12, 0.07), 0.9), [(0.15, 0), (0.06, 2.5)], (0, 0, 0), 8)
+    for part in (crown, trunk):
+        part.location = (0, 0, -50)
+    for _ in range(150):
+        x, y = chance.uniform(-20, 20), chance.uniform(-2, 40)
+        size, turn = chance.uniform(0.8, 1.6), chance.uniform(0, math.tau)
+        for part in (crown, trunk):
+            stage.copy(part, (x, y, 0), size, (0, 0, turn))
+    stage.lamp("SUN", (-3, -8, 9), (0, 0, 0), 4.0, angle=0.01)
+    stage.camera((0, -9, 2.2), (0, 0, 3), 32)
+
+
 SCENES = {
-    f.__name__: f for f in (product, night, garden, character, bottle, scan, isometric, logo, corridor, macro)
+    f.__name__: f for f in (product, night, garden, character, bottle, scan, isometric, logo, corridor, macro, forest)
 }
