@@ -31,13 +31,7 @@ void leave_all(const KernelGlobals& g,
     const std::int32_t graph = g.materials[material].graph_index;
     const GraphProgramView* const program = graph >= 0 ? &g.graphs[graph] : nullptr;
     if (program != nullptr) {
-      for (std::uint32_t k = 0; k < count; ++k) {
-        graph_load_point(*program,
-                         surface_graph_point(g, state, paths[k], located[k], -path_direction(state, paths[k])),
-                         static_cast<int>(k), registers);
-      }
-      registers.used = (1u << count) - 1;
-      g.run_graph(*program, g.textures, registers);
+      surface_graph_run(g, state, *program, paths, static_cast<int>(count), located, registers);
       counters.graph_runs += 1;
       counters.graph_points += count;
     }

@@ -192,13 +192,7 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
       continue;
     }
     const GraphProgramView& program = g.graphs[material.graph_index];
-    for (std::uint32_t lane = 0; lane < count; ++lane) {
-      const std::uint32_t path = queue.paths[first + lane];
-      graph_load_point(program, surface_graph_point(g, state, path, located[lane], -path_direction(state, path)),
-                       static_cast<int>(lane), registers);
-    }
-    registers.used = (1u << count) - 1;
-    g.run_graph(program, g.textures, registers);
+    surface_graph_run(g, state, program, queue.paths + first, static_cast<int>(count), located, registers);
     sinks.counters.graph_runs += 1;
     sinks.counters.graph_points += count;
     const SurfaceGroup group{queue.paths + first, static_cast<int>(count), located, program, registers};

@@ -240,6 +240,25 @@ RELIEF_KERNEL GraphPoint surface_graph_point(const KernelGlobals& g,
            path_ray_length(g, state, path), path_time(state, path)}};
 }
 
+/// Runs the program of a material at up to eight hits of it, a lane each.
+/// @param located  of paths, in their order
+RELIEF_KERNEL void surface_graph_run(const KernelGlobals& g,
+                                     const PathState& state,
+                                     const GraphProgramView& program,
+                                     const std::uint32_t* paths,
+                                     int count,
+                                     const SurfaceInteraction* located,
+                                     GraphRegisters& registers)
+{
+  for (int k = 0; k < count; ++k) {
+    const std::uint32_t path = paths[k];
+    graph_load_point(program, surface_graph_point(g, state, path, located[k], -path_direction(state, path)), k,
+                     registers);
+  }
+  registers.used = (1u << count) - 1;
+  g.run_graph(program, g.textures, registers);
+}
+
 /// How a path blurs the microfacets that it meets.
 struct SurfaceBlur {
   float alpha = 0;        ///< see path_blur
