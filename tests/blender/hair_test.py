@@ -56,6 +56,20 @@ def test_ribbons():
     assert_agrees(scene, samples=16)
 
 
+def test_no_width():
+    """Strands without a width are not seen, and not asked for point by point; one end is width enough."""
+    from relief.export import hair
+
+    scene = _stage()
+    ball = _grow(diffuse((0.7, 0.4, 0.2)), root_radius=0, tip_radius=0)
+    assert_agrees(scene, samples=16)
+    system = ball.particle_systems[0].settings
+    for root, tip, scale, is_seen in ((0, 0, 1, False), (1, 1, 0, False), (1, 0, 1, True), (0, 1, 1, True)):
+        system.root_radius, system.tip_radius, system.radius_scale = root, tip, scale
+        evaluated = ball.evaluated_get(bpy.context.evaluated_depsgraph_get())
+        assert bool(hair.of_particles(evaluated, True)) == is_seen, (root, tip, scale)
+
+
 def test_principled_ribbons():
     """Their normals turn from edge to edge, far from the geometric one; light goes on from strand to strand."""
     scene = _stage()

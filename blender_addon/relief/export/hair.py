@@ -108,7 +108,8 @@ def _of_system(evaluated, modifier, system, is_final):
     size = (1 << (settings.render_step if is_final else settings.display_step)) + 1
     if settings.kink == "SPIRAL":
         size += settings.kink_extra_steps
-    if not len(numbers):
+    # Strands without a width are not seen, in Cycles neither, and their points are dear to ask for.
+    if not len(numbers) or not settings.radius_scale * max(settings.root_radius, settings.tip_radius) > 0:
         return None
     at = system.co_hair
     points = (at(evaluated, particle_no=number, step=step) for number in numbers for step in range(size))
