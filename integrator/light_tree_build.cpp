@@ -33,20 +33,45 @@ LightCone cone_union(const LightCone& a, const LightCone& b)
   return {normalize(wide.axis * std::cos(by) + turn * (std::sin(by) / turn_length)), angle};
 }
 
-LightBounds bounds_union(const LightBounds& a, const LightBounds& b)
-{
-  if (a.intensity == 0) return b;
-  if (b.intensity == 0) return a;
-  LightBounds both;
-  both.low = min(a.low, b.low);
-  both.high = max(a.high, b.high);
-  both.spread = cone_union(a.spread, b.spread);
-  both.falloff = std::max(a.falloff, b.falloff);
-  both.intensity = std::min(a.intensity + b.intensity, 1e30f);
-  both.two_sided = a.two_sided || b.two_sided;
-  both.has_dim_side = a.has_dim_side || b.has_dim_side;
-  return both;
-}
+/// Bounds around lights or groups that are added one after the other.
+class BoundsSum {
+ public:
+  void add(const LightBounds& other)
+  {
+    if (other.intensity == 0) return;
+    if (bounds_.intensity == 0) {
+      bounds_ = other;
+      chord_squared_ = chord_squared_of(bounds_.spread.angle);
+      return;
+    }
+    bounds_.low = min(bounds_.low, other.low);
+    bounds_.high = max(bounds_.high, other.high);
+    if (!spread_holds(other.spread)) {
+      bounds_.spread = cone_union(bounds_.spread, other.spread);
+      chord_squared_ = chord_squared_of(bounds_.spread.angle);
+    }
+    bounds_.falloff = std::max(bounds_.falloff, other.falloff);
+    bounds_.intensity = std::min(bounds_.intensity + other.intensity, 1e30f);
+    bounds_.profile_mean = 1;
+    bounds_.profile_slope = {};
+    bounds_.is_flat = false;
+    bounds_.two_sided |= other.two_sided;
+    bounds_.has_dim_side |= other.has_dim_side;
+  }
+  const LightBounds& bounds() const { return bounds_; }
+
+ private:
+  static float chord_squared_of(float angle) { return 4.0f * sqr(std::sin(0.5f * angle)); }
+  /// Without an arc tangent, which most lights that are added need not: they emit along one axis, and within the cone.
+  bool spread_holds(const LightCone& cone) const
+  {
+    if (bounds_.spread.angle >= kPiAngle) return true;
+    return cone.angle == 0 && length_squared(cone.axis - bounds_.spread.axis) <= chord_squared_;
+  }
+
+  LightBounds bounds_;
+  float chord_squared_ = 0;  ///< of the distance between unit vectors along the axis and along the border of the spread
+};
 
 Vec3f bounds_centre(const LightBounds& bounds) { return bounds.low * 0.5f + bounds.high * 0.5f; }
 
@@ -70,7 +95,8 @@ LightBounds moving_bounds(const LightSet& set, std::uint32_t index, float scale)
   view.motions = set.motions;
   // What lies between two of these times is covered by what they differ by.
   constexpr int kTimes = 64;
-  LightBounds all, before;
+  BoundsSum sum;
+  LightBounds before;
   float farthest = 0, widest = 0;
   Vec3f slope;
   for (int i = 0; i <= kTimes; ++i) {
@@ -83,9 +109,10 @@ LightBounds moving_bounds(const LightSet& set, std::uint32_t index, float scale)
       widest = std::max(widest, std::acos(std::clamp(dot(one.spread.axis, before.spread.axis), -1.0f, 1.0f)));
     }
     slope += one.profile_slope * (1.0f / (kTimes + 1));
-    all = bounds_union(all, one);
+    sum.add(one);
     before = one;
   }
+  LightBounds all = sum.bounds();
   all.low = all.low - splat3(farthest);
   all.high = all.high + splat3(farthest);
   all.spread.angle = std::min(all.spread.angle + widest, kPiAngle);
@@ -226,11 +253,13 @@ struct RangeBounds {
 RangeBounds range_bounds(std::span<const BuildLight> lights)
 {
   RangeBounds range;
+  BoundsSum sum;
   for (const BuildLight& light : lights) {
-    range.bounds = bounds_union(range.bounds, light.bounds);
+    sum.add(light.bounds);
     range.centre_low = min(range.centre_low, light.centre);
     range.centre_high = max(range.centre_high, light.centre);
   }
+  range.bounds = sum.bounds();
   return range;
 }
 
@@ -253,24 +282,28 @@ std::size_t range_split(std::span<BuildLight> lights, const RangeBounds& range, 
   };
   for (int axis = 0; axis < 3 && !balanced; ++axis) {
     if (!(component(extent, axis) > 0.0f)) continue;
-    std::array<LightBounds, kBins> bins;
-    for (const BuildLight& light : lights) {
-      LightBounds& bin = bins[static_cast<std::size_t>(bin_of(light, axis))];
-      bin = bounds_union(bin, light.bounds);
-    }
+    std::array<BoundsSum, kBins> bins;
+    for (const BuildLight& light : lights) bins[static_cast<std::size_t>(bin_of(light, axis))].add(light.bounds);
+    const auto is_empty = [&](int i) { return bins[static_cast<std::size_t>(i)].bounds().intensity == 0; };
+    // Before and behind an empty bin the parts are the same. Of few lights most bins are empty.
     std::array<float, kBins> cost_above{};
-    LightBounds above;
+    BoundsSum above;
+    float cost = 0;
     for (int i = kBins - 1; i > 0; --i) {
-      above = bounds_union(above, bins[static_cast<std::size_t>(i)]);
-      cost_above[static_cast<std::size_t>(i)] = group_cost(above);
+      if (!is_empty(i)) {
+        above.add(bins[static_cast<std::size_t>(i)].bounds());
+        cost = group_cost(above.bounds());
+      }
+      cost_above[static_cast<std::size_t>(i)] = cost;
     }
-    LightBounds below;
+    BoundsSum below;
     // Splits across the longest side are preferred: thin slabs of lights are poor groups.
     const float regularity = longest / component(extent, axis);
     for (int i = 1; i < kBins; ++i) {
-      below = bounds_union(below, bins[static_cast<std::size_t>(i - 1)]);
-      const float cost = regularity * (group_cost(below) + cost_above[static_cast<std::size_t>(i)]);
-      if (below.intensity > 0 && cost < best_cost) {
+      if (is_empty(i - 1)) continue;
+      below.add(bins[static_cast<std::size_t>(i - 1)].bounds());
+      cost = regularity * (group_cost(below.bounds()) + cost_above[static_cast<std::size_t>(i)]);
+      if (cost < best_cost) {
         best_cost = cost;
         best_axis = axis;
         best_bin = i;
