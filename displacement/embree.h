@@ -32,11 +32,19 @@ struct FarStart {
   double t = 0;         ///< how far it was moved
 };
 
+/// Of a scene whose hits a query may filter, see embree_context_filter.
+#if RTC_VERSION_MAJOR >= 4
+inline constexpr RTCSceneFlags kSceneTakesFilter = RTC_SCENE_FLAG_FILTER_FUNCTION_IN_ARGUMENTS;
+#else
+inline constexpr RTCSceneFlags kSceneTakesFilter = RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION;
+#endif
+
 /// What a query hands to callbacks: Embree's own context first, so that a callback can cast back. Every query of a scene
 /// with displaced geometry uses one of these.
 struct EmbreeContext {
 #if RTC_VERSION_MAJOR >= 4
   RTCRayQueryContext rtc;
+  RTCFilterFunctionN filter = nullptr;  ///< see embree_context_filter
 #else
   RTCIntersectContext rtc;
 #endif
@@ -60,12 +68,26 @@ inline void embree_context_init(EmbreeContext& context, [[maybe_unused]] bool co
 #endif
 }
 
+/// Makes searches for the nearest hit of one ray ask of each hit whether it counts. User geometry does not ask.
+inline void embree_context_filter(EmbreeContext& context, RTCFilterFunctionN filter)
+{
+#if RTC_VERSION_MAJOR >= 4
+  context.filter = filter;
+#else
+  context.rtc.filter = filter;
+#endif
+}
+
 inline void embree_intersect1(RTCScene scene, EmbreeContext& context, RTCRayHit& ray)
 {
 #if RTC_VERSION_MAJOR >= 4
   RTCIntersectArguments arguments;
   rtcInitIntersectArguments(&arguments);
   arguments.context = &context.rtc;
+  if (context.filter != nullptr) {
+    arguments.filter = context.filter;
+    arguments.flags = RTC_RAY_QUERY_FLAG_INVOKE_ARGUMENT_FILTER;
+  }
   rtcIntersect1(scene, &ray, &arguments);
 #else
   rtcIntersect1(scene, &context.rtc, &ray);

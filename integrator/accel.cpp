@@ -10,7 +10,6 @@
 
 #include "integrator/ray_surface.h"
 #include "integrator/stages.h"
-#include "integrator/triangle_pairs.h"
 #include "scene/memory.h"
 
 namespace relief {
@@ -259,7 +258,7 @@ void Accel::pair_triangles()
   for (MeshUse& use : meshes_) {
     if (use.count == 0 || !use.mesh.radius.empty()) continue;
     use.pairs = triangle_pairs_make(*use.mesh.P, use.mesh.triangles);
-    const std::size_t count = use.pairs.size() - 1;
+    const std::size_t count = use.pairs.size();
     if (!use.has_tree()) {
       num_triangles += use.mesh.triangles.size();
       num_pairs += count;
@@ -514,7 +513,7 @@ void Accel::to_triangle(unsigned object, std::uint32_t* primitive, float* u, flo
   if (object >= views_->instances.size() || (views_->instances[object].flags & kDisplaced) != 0) return;
   const MeshUse& use = use_of(object);
   if (use.pairs.empty()) return;
-  const TrianglePlace place = pair_place(use.pairs, use.mesh.triangles, *primitive, *u, *v);
+  const TrianglePlace place = pair_place(use.pairs[*primitive], *u, *v);
   *primitive = place.triangle;
   *u = place.u;
   *v = place.v;
@@ -526,6 +525,69 @@ void Accel::intersect(EmbreeContext& context, RTCRayHit& ray) const
   if (!has_pairs_ || ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return;
   const unsigned object = met_object(ray);
   to_triangle(object, &ray.hit.primID, &ray.hit.u, &ray.hit.v);
+}
+
+namespace {
+
+/// Context of a query that gathers hits: Embree's part first.
+struct GatheringContext {
+  EmbreeContext embree;
+  const Accel* accel = nullptr;
+  unsigned instance = 0;
+  std::span<RTCRayHit> hits;
+  std::size_t num_hits = 0;
+};
+
+/// No hit counts, so that the search goes on.
+void gathering_filter(const RTCFilterFunctionNArguments* arguments)
+{
+  auto& context = *reinterpret_cast<GatheringContext*>(arguments->context);
+  for (unsigned i = 0; i < arguments->N; ++i) {
+    if (arguments->valid[i] != -1) continue;
+    arguments->valid[i] = 0;
+    RTCRayHit met;
+    met.hit = rtcGetHitFromHitN(arguments->hit, arguments->N, i);
+    if (context.num_hits == context.hits.size() ||
+        !context.accel->are_of_one_object(met_object(met), context.instance)) {
+      continue;
+    }
+    const auto t = static_cast<double>(RTCRayN_tfar(arguments->ray, arguments->N, i));
+    const ObjectRay* inside = context.embree.object_ray;
+    met.ray.tfar = static_cast<float>(inside == nullptr ? t : inside->t_start + inside->t_scale * t);
+    context.hits[context.num_hits++] = met;
+  }
+}
+
+}  // namespace
+
+std::size_t Accel::gather_hits(unsigned instance, const RTCRayHit& ray, std::span<RTCRayHit> hits) const
+{
+  std::size_t num_hits = 0;
+  RTCRayHit search = ray;
+  if (!displaced_.empty() || ray_start(target_, ray.ray) != RayStart::kNear) {
+    // Displaced geometry asks no filter, and may be nearer than what has been gathered.
+    EmbreeContext context;
+    embree_context_init(context, false);
+    const auto is_wanted = [&](unsigned met) { return are_of_one_object(met, instance); };
+    while (num_hits < hits.size() && intersect_only(context, search, is_wanted) != RTC_INVALID_GEOMETRY_ID) {
+      hits[num_hits++] = search;
+      search.ray.tnear = t_min_behind(search.ray.tfar);
+      search.ray.tfar = ray.ray.tfar;
+    }
+    return num_hits;
+  }
+  GatheringContext context{{}, this, instance, hits};
+  embree_context_init(context.embree, false);
+  embree_context_filter(context.embree, gathering_filter);
+  search.hit.geomID = search.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  embree_intersect1(top_, context.embree, search);
+  for (RTCRayHit& met : hits.first(context.num_hits)) {
+    const float t = met.ray.tfar;
+    met.ray = ray.ray;
+    met.ray.tfar = t;
+    if (has_pairs_) to_triangle(met_object(met), &met.hit.primID, &met.hit.u, &met.hit.v);
+  }
+  return context.num_hits;
 }
 
 void Accel::intersect8(EmbreeContext& context, RTCRayHit8& rays) const
@@ -579,7 +641,7 @@ void Accel::set_corners(RTCGeometry geometry, const MeshUse& use)
     return;
   }
   const bool pairs = !use.pairs.empty();
-  const std::size_t count = pairs ? use.pairs.size() - 1 : triangles.size(), sides = pairs ? 4 : 3;
+  const std::size_t count = pairs ? use.pairs.size() : triangles.size(), sides = pairs ? 4 : 3;
   auto* const corners = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0,
                                                                             pairs ? RTC_FORMAT_UINT4 : RTC_FORMAT_UINT3,
                                                                             sides * sizeof(std::uint32_t), count));
@@ -588,7 +650,7 @@ void Accel::set_corners(RTCGeometry geometry, const MeshUse& use)
     std::memcpy(corners, triangles.data(), triangles.size() * sizeof(TriangleIndices));
     return;
   }
-  for (std::size_t k = 0; k < count; ++k) pair_corners(use.pairs, triangles, k, corners + 4 * k);
+  for (std::size_t k = 0; k < count; ++k) pair_corners(use.pairs[k], triangles, corners + 4 * k);
 }
 
 RTCGeometry Accel::new_mesh(const MeshUse& use, const Affine3* world_from_object)

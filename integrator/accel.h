@@ -13,6 +13,7 @@
 #include "displacement/far_ray.h"
 #include "integrator/kept_trees.h"
 #include "integrator/scene_views.h"
+#include "integrator/triangle_pairs.h"
 #include "kernel/light/light.h"
 #include "kernel/math/rounding.h"
 #include "kernel/photon/box_aim.h"
@@ -91,6 +92,11 @@ class Accel {
       ray.ray.tnear = t_min_behind(ray.ray.tfar);
     }
   }
+  /// All hits on one object, on whichever of its parts, in no order.
+  /// @param ray   as above
+  /// @param hits  get the ray's words too, with its tfar where it met the surface; once they are full, others are left out
+  /// @return      how many
+  std::size_t gather_hits(unsigned instance, const RTCRayHit& ray, std::span<RTCRayHit> hits) const;
   /// The same as intersect for a packet.
   void intersect8(EmbreeContext& context, RTCRayHit8& rays) const;
   /// Brings a hit of Embree's on quadrilaterals to the mesh's triangles, see triangle_pairs.h. What the above say is that already;
@@ -155,7 +161,7 @@ class Accel {
     Box3 box;                  ///< object space, of meshes with a tree; over all time
     Vec3f pad;                 ///< by which it is enlarged
     TreePointer tree;          ///< null: it is in place
-    std::vector<std::uint32_t> pairs;  ///< see triangle_pairs_make: quadrilaterals of the tree; empty: it has triangles
+    std::vector<TrianglePair> pairs;  ///< quadrilaterals of the tree; empty: it has triangles
 
     bool has_tree() const { return count > 1 || takes_time || at_border || !mesh.radius.empty(); }
   };

@@ -55,7 +55,7 @@ KeptTrees::KeptTrees(bool keeps) : keeps_(keeps), device_(std::make_shared<Devic
 TreePointer KeptTrees::scene_make() const
 {
   TreePointer tree = own(rtcNewScene(device()));
-  rtcSetSceneFlags(tree.get(), RTC_SCENE_FLAG_ROBUST);
+  rtcSetSceneFlags(tree.get(), static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_ROBUST | kSceneTakesFilter));
   return tree;
 }
 

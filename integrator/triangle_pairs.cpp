@@ -4,7 +4,6 @@
 
 #include <tbb/parallel_for.h>
 
-#include "kernel/assert.h"
 #include "kernel/math/box.h"
 
 namespace relief {
@@ -65,7 +64,7 @@ std::uint32_t pair_stretch(std::span<const Vec3f> P,
 
 PairTurns pair_turns(const TriangleIndices& first, const TriangleIndices& second)
 {
-  // By bits, the first of which is the answer: each hit asks, and branches would be mispredicted half of the time.
+  // By bits, the first of which is the answer: branches would be mispredicted half of the time.
   unsigned shared = 0;
   for (int i = 0; i < 3; ++i) {
     const std::uint32_t b = corner(first, i + 1), d = corner(first, i + 2);
@@ -76,10 +75,10 @@ PairTurns pair_turns(const TriangleIndices& first, const TriangleIndices& second
   }
   if (shared == 0) return {};
   const int at = __builtin_ctz(shared);
-  return {at / 3, at % 3};
+  return {static_cast<std::int16_t>(at / 3), static_cast<std::int16_t>(at % 3)};
 }
 
-std::vector<std::uint32_t> triangle_pairs_make(std::span<const Vec3f> P, std::span<const TriangleIndices> triangles)
+std::vector<TrianglePair> triangle_pairs_make(std::span<const Vec3f> P, std::span<const TriangleIndices> triangles)
 {
   const std::size_t num_stretches = (triangles.size() + kStretch - 1) / kStretch;
   std::vector<std::uint8_t> is_second(triangles.size());
@@ -90,49 +89,39 @@ std::vector<std::uint32_t> triangle_pairs_make(std::span<const Vec3f> P, std::sp
                                  std::span(is_second).subspan(s * kStretch, length(s)));
   });
   for (std::size_t s = 0; s < num_stretches; ++s) begins[s + 1] += begins[s];
-  std::vector<std::uint32_t> first(begins.back() + std::size_t{1});
+  std::vector<TrianglePair> pairs(begins.back());
   tbb::parallel_for(std::size_t{0}, num_stretches, [&](std::size_t s) {
-    std::uint32_t* out = first.data() + begins[s];
-    for (std::size_t k = s * kStretch; k < s * kStretch + length(s); ++k) {
-      if (is_second[k] == 0) *out++ = static_cast<std::uint32_t>(k);
+    TrianglePair* out = pairs.data() + begins[s];
+    const std::size_t end = s * kStretch + length(s);
+    for (std::size_t k = s * kStretch; k < end; ++k) {
+      if (is_second[k] != 0) continue;
+      *out++ = {static_cast<std::uint32_t>(k),
+                k + 1 < end && is_second[k + 1] != 0 ? pair_turns(triangles[k], triangles[k + 1]) : PairTurns{}};
     }
   });
-  first.back() = static_cast<std::uint32_t>(triangles.size());
-  return first;
+  return pairs;
 }
 
-void pair_corners(std::span<const std::uint32_t> pairs,
-                  std::span<const TriangleIndices> triangles,
-                  std::size_t pair,
-                  std::uint32_t corners[4])
+void pair_corners(const TrianglePair& pair, std::span<const TriangleIndices> triangles, std::uint32_t corners[4])
 {
-  const std::uint32_t k = pairs[pair];
-  const TriangleIndices& t = triangles[k];
-  if (pairs[pair + 1] == k + 1) {
+  const TriangleIndices& t = triangles[pair.first];
+  if (pair.turns.first < 0) {
     // Embree takes a quadrilateral whose last two vertices are one for a triangle.
     corners[0] = t.v0, corners[1] = t.v1, corners[2] = corners[3] = t.v2;
     return;
   }
-  const PairTurns turns = pair_turns(t, triangles[k + 1]);
-  RELIEF_ASSERT(turns.first >= 0);
-  for (int i = 0; i < 3; ++i) corners[i < 2 ? i : 3] = corner(t, turns.first + i);
-  corners[2] = corner(triangles[k + 1], turns.second);
+  for (int i = 0; i < 3; ++i) corners[i < 2 ? i : 3] = corner(t, pair.turns.first + i);
+  corners[2] = corner(triangles[pair.first + 1], pair.turns.second);
 }
 
-TrianglePlace pair_place(std::span<const std::uint32_t> pairs,
-                         std::span<const TriangleIndices> triangles,
-                         std::size_t pair,
-                         float u,
-                         float v)
+TrianglePlace pair_place(const TrianglePair& pair, float u, float v)
 {
-  const std::uint32_t k = pairs[pair];
-  if (pairs[pair + 1] == k + 1) return {k, u, v};
-  const PairTurns turns = pair_turns(triangles[k], triangles[k + 1]);
+  if (pair.turns.first < 0) return {pair.first, u, v};
   const bool on_second = u + v > 1.0f;
   const float on[2][3] = {{1.0f - (u + v), u, v}, {u + v - 1.0f, 1.0f - u, 1.0f - v}};
   const float* weights = on[on_second ? 1 : 0];
-  const int turn = on_second ? turns.second : turns.first;
-  return {k + (on_second ? 1u : 0u), weights[(4 - turn) % 3], weights[(5 - turn) % 3]};
+  const int turn = on_second ? pair.turns.second : pair.turns.first;
+  return {pair.first + (on_second ? 1u : 0u), weights[(4 - turn) % 3], weights[(5 - turn) % 3]};
 }
 
 }  // namespace relief

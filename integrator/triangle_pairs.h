@@ -11,8 +11,14 @@ namespace relief {
 
 /// How two triangles are the halves (a, b, d) and (c, d, b) of a quadrilateral (a, b, c, d).
 struct PairTurns {
-  int first = -1;  ///< which corner of the first triangle is a; −1: they share no edge, or do not wind alike
-  int second = 0;  ///< which corner of the second one is c
+  std::int16_t first = -1;  ///< which corner of the first triangle is a; −1: they share no edge, or do not wind alike
+  std::int16_t second = 0;  ///< which corner of the second one is c
+};
+
+/// A pair of triangles, or one that stays alone. It knows its turns, because each hit asks for them.
+struct TrianglePair {
+  std::uint32_t first = 0;  ///< its first triangle; the second one follows
+  PairTurns turns;          ///< first is −1: there is no second one
 };
 
 PairTurns pair_turns(const TriangleIndices& first, const TriangleIndices& second);
@@ -20,17 +26,13 @@ PairTurns pair_turns(const TriangleIndices& first, const TriangleIndices& second
 /// Puts triangles that follow each other in pairs, where one box around both is smaller than one around each. Of all such ways it is the
 /// one with the least area of boxes.
 /// @param P  of the vertices
-/// @return   of each pair, and of each triangle that stays alone, the first triangle; at the end the number of triangles
+/// @return   in the order of the triangles
 /// @cost     a byte a triangle while it runs; parallel
 /// @pre      fewer than 2³² triangles
-std::vector<std::uint32_t> triangle_pairs_make(std::span<const Vec3f> P, std::span<const TriangleIndices> triangles);
+std::vector<TrianglePair> triangle_pairs_make(std::span<const Vec3f> P, std::span<const TriangleIndices> triangles);
 
 /// The corners of a pair as those of a quadrilateral.
-/// @param pair  of triangle_pairs_make's
-void pair_corners(std::span<const std::uint32_t> pairs,
-                  std::span<const TriangleIndices> triangles,
-                  std::size_t pair,
-                  std::uint32_t corners[4]);
+void pair_corners(const TrianglePair& pair, std::span<const TriangleIndices> triangles, std::uint32_t corners[4]);
 
 /// A place on a triangle.
 struct TrianglePlace {
@@ -40,10 +42,6 @@ struct TrianglePlace {
 
 /// Brings a place on a quadrilateral, as Embree has it, to the triangle.
 /// @param u, v  weights of b and d on the first half; on the second one, u + v > 1, one less those of d and b
-TrianglePlace pair_place(std::span<const std::uint32_t> pairs,
-                         std::span<const TriangleIndices> triangles,
-                         std::size_t pair,
-                         float u,
-                         float v);
+TrianglePlace pair_place(const TrianglePair& pair, float u, float v);
 
 }  // namespace relief

@@ -89,10 +89,10 @@ class MeshTracer : public VectorTracer {
                                view_.num_vertices);
     if (in_pairs) {
       pairs_ = triangle_pairs_make(vertices(), triangles());
-      const std::size_t count = pairs_.size() - 1;
+      const std::size_t count = pairs_.size();
       auto* const corners = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(
           geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT4, 4 * sizeof(std::uint32_t), count));
-      for (std::size_t k = 0; k < count; ++k) pair_corners(pairs_, triangles(), k, corners + 4 * k);
+      for (std::size_t k = 0; k < count; ++k) pair_corners(pairs_[k], triangles(), corners + 4 * k);
     } else {
       rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, view_.triangles, 0,
                                  sizeof(TriangleIndices), view_.num_triangles);
@@ -110,8 +110,8 @@ class MeshTracer : public VectorTracer {
   std::size_t mesh_bytes() const { return mesh_.bytes() + pairs_.capacity() * sizeof(pairs_[0]); }
   MicroHit point(const RTCHit& hit) const override
   {
-    const TrianglePlace place = pairs_.empty() ? TrianglePlace{hit.primID, hit.u, hit.v}
-                                               : pair_place(pairs_, triangles(), hit.primID, hit.u, hit.v);
+    const TrianglePlace place =
+        pairs_.empty() ? TrianglePlace{hit.primID, hit.u, hit.v} : pair_place(pairs_[hit.primID], hit.u, hit.v);
     const TriangleIndices& t = view_.triangles[place.triangle];
     const Vec3d P0 = to_double(view_.P[t.v0]), e1 = to_double(view_.P[t.v1]) - P0, e2 = to_double(view_.P[t.v2]) - P0;
     const auto u = static_cast<double>(place.u), v = static_cast<double>(place.v);
@@ -121,7 +121,7 @@ class MeshTracer : public VectorTracer {
 
   MovedMesh mesh_;
   MeshView view_;
-  std::vector<std::uint32_t> pairs_;  ///< empty: every triangle is by itself
+  std::vector<TrianglePair> pairs_;  ///< empty: every triangle is by itself
 };
 
 VectorResult measured(const VectorScene& scene, BenchResolution resolution, int rounds)

@@ -107,6 +107,66 @@ double slope_by_sums(double x, double radius)
   return wall / floor;
 }
 
+TEST(Bevel, DistancesAreThoseOfTheirShares)
+{
+  EXPECT_EQ(bevel_distance(1.0f), 0.0f);
+  for (int i = 0; i <= 4000; ++i) {
+    // Where r and 1 − r are small as well. Shares near 1 are rounded: what is asked for is another one.
+    const double part = i / 4000.0, r = part * part * (3 - 2 * part);
+    const auto share_of = [](double x) { return std::pow(1 - x, 4) * (1 + 4 * x); };
+    const auto u = static_cast<float>(share_of(r));
+    const double rounded =
+        std::abs(static_cast<double>(u) - share_of(r)) / std::max(20 * r * std::pow(1 - r, 3), 1e-12);
+    if (rounded < 1e-7) {
+      EXPECT_NEAR(static_cast<double>(bevel_distance(u)), r, 2e-6) << r;
+    }
+  }
+}
+
+TEST(Bevel, IsTheSameBesideADisplacedObject)
+{
+  // Where something is displaced, a ray's hits are looked for one after the other: the same ones as otherwise at once.
+  Scene scene = cliff();
+  add_object(scene, quad_mesh({-9, -0.1f, 9}, {18, 0, 0}, {0, 0.2f, -18}), diffuse_material({1, 1, 1}));
+  scene.instances.back().object_index = 0;
+  const Vec3f at_once = beveled(scene, -0.1f, 0.5f);
+  EXPECT_GT(at_once.x, 0.01f);
+  add_object(scene, horizontal(-50), diffuse_material({1, 1, 1}));
+  add_displacement(scene, 2, {0, 1, 2, 3}, 0.1f);
+  scene.materials.back().displacement_index = 0;
+  const Vec3f one_by_one = beveled(scene, -0.1f, 0.5f);
+  for (const float difference : {at_once.x - one_by_one.x, at_once.y - one_by_one.y, at_once.z - one_by_one.z}) {
+    EXPECT_NEAR(difference, 0.0f, 1e-5f);
+  }
+}
+
+TEST(Bevel, IsTheSameOfInstances)
+{
+  // Meshes that occur twice have trees of their own; so small in so large a world those are not Embree's instances.
+  Scene scene = cliff();
+  const Vec3f in_place = beveled(scene, -0.1f, 0.5f);
+  const std::vector<Instance> placed = scene.instances;
+  for (const float away : {40.0f, 4e6f}) {
+    scene.instances = placed;
+    for (Instance instance : placed) {
+      instance.world_from_object.p = {away, 0, 0};
+      instance.object_index = 1;
+      scene.instances.push_back(instance);
+    }
+    const Vec3f N = beveled(scene, -0.1f, 0.5f);
+    EXPECT_NEAR(N.x, in_place.x, 1e-5f) << away;
+    EXPECT_NEAR(N.z, in_place.z, 1e-5f) << away;
+  }
+}
+
+TEST(Bevel, LooksFartherThanItsSceneIsWide)
+{
+  // Many rays start far away from the scene then, and nearness weighs floor and wall alike.
+  const Vec3f N = beveled(cliff(), -0.1f, 400.0f);
+  EXPECT_NEAR(N.x, std::sqrt(0.5f), 0.05f);
+  EXPECT_NEAR(N.z, std::sqrt(0.5f), 0.05f);
+}
+
 TEST(Bevel, OfAPlaneIsThePlane)
 {
   Scene scene = empty_scene();

@@ -107,16 +107,16 @@ TEST(TrianglePairs, HaveTheLeastAreaOfBoxesOfAllWays)
       const double area = area_of_way(P, triangles, way);
       if (area >= 0) least = std::min(least, area);
     }
-    const std::vector<std::uint32_t> first = triangle_pairs_make(P, triangles);
-    ASSERT_EQ(first.front(), 0u);
-    ASSERT_EQ(first.back(), count);
     unsigned chosen = 0;
-    for (std::size_t k = 0; k + 1 < first.size(); ++k) {
-      ASSERT_TRUE(first[k + 1] == first[k] + 1 || first[k + 1] == first[k] + 2);
-      if (first[k + 1] != first[k] + 2) continue;
-      chosen |= 2u << first[k];
+    std::uint32_t next = 0;
+    for (const TrianglePair& pair : triangle_pairs_make(P, triangles)) {
+      ASSERT_EQ(pair.first, next);
+      next += pair.turns.first < 0 ? 1 : 2;
+      if (pair.turns.first < 0) continue;
+      chosen |= 2u << pair.first;
       ++num_paired;
     }
+    ASSERT_EQ(next, count);
     EXPECT_NEAR(area_of_way(P, triangles, chosen), least, 1e-5 * least) << trial;
   }
   EXPECT_GT(num_paired, 200);
@@ -129,10 +129,10 @@ TEST(TrianglePairs, AreTheHalvesOfTheirQuadrilaterals)
   std::uniform_real_distribution<float> uniform(0, 1);
   for (int turns = 0; turns < 9; ++turns) {
     const std::vector<TriangleIndices> triangles = {turned({0, 1, 3}, turns / 3), turned({2, 3, 1}, turns % 3)};
-    const std::vector<std::uint32_t> first = triangle_pairs_make(P, triangles);
-    ASSERT_EQ(first, (std::vector<std::uint32_t>{0, 2}));
+    const std::vector<TrianglePair> pairs = triangle_pairs_make(P, triangles);
+    ASSERT_EQ(pairs.size(), 1u);
     std::uint32_t c[4];
-    pair_corners(first, triangles, 0, c);
+    pair_corners(pairs[0], triangles, c);
     EXPECT_TRUE(is_same({c[0], c[1], c[3]}, triangles[0]));
     EXPECT_TRUE(is_same({c[2], c[3], c[1]}, triangles[1]));
     for (int i = 0; i < 100; ++i) {
@@ -142,7 +142,7 @@ TEST(TrianglePairs, AreTheHalvesOfTheirQuadrilaterals)
       const double du = u, dv = v;
       const Vec3d expected = u + v <= 1.0f ? (1 - du - dv) * at(0) + du * at(1) + dv * at(3)
                                            : (du + dv - 1) * at(2) + (1 - du) * at(3) + (1 - dv) * at(1);
-      const TrianglePlace place = pair_place(first, triangles, 0, u, v);
+      const TrianglePlace place = pair_place(pairs[0], u, v);
       ASSERT_EQ(place.triangle, u + v <= 1.0f ? 0u : 1u);
       const TriangleIndices& t = triangles[place.triangle];
       const double pu = place.u, pv = place.v;
@@ -171,9 +171,12 @@ TEST(TrianglePairs, AreTheSameHoweverManyThereAre)
     mesh.triangles.push_back({a, a + 1, a + kSide + 2});
     mesh.triangles.push_back({a, a + kSide + 2, a + kSide + 1});
   }
-  const std::vector<std::uint32_t> first = triangle_pairs_make(mesh.P, mesh.triangles);
-  ASSERT_EQ(first.size(), std::size_t{kSide} * kSide + 1);
-  for (std::uint32_t k = 0; k <= kSide * kSide; ++k) EXPECT_EQ(first[k], 2 * k);
+  const std::vector<TrianglePair> pairs = triangle_pairs_make(mesh.P, mesh.triangles);
+  ASSERT_EQ(pairs.size(), std::size_t{kSide} * kSide);
+  for (std::uint32_t k = 0; k < kSide * kSide; ++k) {
+    EXPECT_EQ(pairs[k].first, 2 * k);
+    EXPECT_GE(pairs[k].turns.first, 0);
+  }
 }
 
 /// Whether two triangles that share an edge stand next to each other.
@@ -205,7 +208,7 @@ Mesh torus_mesh(std::uint32_t around, std::uint32_t tube, Order order)
 
 double share_of_pairs(const Mesh& mesh)
 {
-  return static_cast<double>(triangle_pairs_make(mesh.P, mesh.triangles).size() - 1) /
+  return static_cast<double>(triangle_pairs_make(mesh.P, mesh.triangles).size()) /
          static_cast<double>(mesh.triangles.size());
 }
 
