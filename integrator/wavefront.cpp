@@ -24,7 +24,7 @@ std::uint64_t most_searches(const KernelGlobals& g)
   const auto scatterings = static_cast<std::uint64_t>(g.limits.total) + 2;
   const std::uint64_t boundaries = g.media != nullptr ? kMostBoundaries : 0;
   return scatterings * (2 * std::uint64_t{g.num_area_lights} + 1) + static_cast<std::uint64_t>(g.limits.transparent) +
-         boundaries + 1;
+         boundaries + 2;
 }
 
 }  // namespace

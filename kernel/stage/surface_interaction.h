@@ -524,7 +524,11 @@ RELIEF_KERNEL bool path_pass_through(const KernelGlobals& g, PathState& state, s
   if (passed != Vec3f{1, 1, 1}) state.throughput[path] = path_throughput(state, path) * passed;
   state.flags[path] += 1u << kPathTransparentShift;
   state.t_min[path] = t_min_behind(state.hit_t[path]);
-  return (state.flags[path] >> kPathTransparentShift) <= static_cast<std::uint32_t>(g.limits.transparent);
+  // As in Cycles, behind one more than it may pass a path sees what shines.
+  const std::uint32_t passed_so_far = state.flags[path] >> kPathTransparentShift;
+  const auto most = static_cast<std::uint32_t>(g.limits.transparent);
+  if (passed_so_far > most) state.flags[path] |= kPathLast;
+  return passed_so_far <= most + 1u;
 }
 
 /// Origin of a ray that leaves the surface.

@@ -115,13 +115,13 @@ def test_a_noise_threshold_leaves_as_much_noise_as_in_cycles():
     assert 0.75 < np.median(ratios) < 1.25, ratios
 
 
-def _under_sheets(count, from_above):
-    """A floor under sheets that are half transparent, seen from below or through them; four may be passed."""
+def _under_sheets(count, from_above, shines=False):
+    """A floor, lit or shining, under sheets that are half transparent, seen from below or through them; four may be passed."""
     scene = new_scene(16, 12)
     scene.relief.use_cycles_settings = True
     set_bounces(scene, 0)
     scene.cycles.transparent_max_bounces = 4
-    add_plane(40, diffuse((0.8, 0.8, 0.8)))
+    add_plane(40, _material("Emission") if shines else diffuse((0.8, 0.8, 0.8)))
     sheet = _material("BsdfTransparent", Color=(0.9, 0.9, 0.9, 1))
     for i in range(count):
         add_plane(60, sheet, (0, 0, 2 + 0.5 * i))
@@ -139,3 +139,11 @@ def test_light_passes_as_many_surfaces_as_in_cycles():
         # Suns are disks: of their edge noise is left.
         assert abs(relief - cycles) <= 0.01 * cycles, (count, from_above, relief, cycles)
         assert (cycles > 0) == (2 * count <= 4 if from_above else count <= 4), (count, from_above, cycles)
+
+
+def test_behind_one_more_surface_paths_see_what_shines():
+    for count in (3, 4, 5, 6):
+        relief, cycles = _under_sheets(count, True, shines=True)
+        # Cycles ends such paths by chance.
+        assert abs(relief - cycles) <= 0.02 * cycles, (count, relief, cycles)
+        assert (cycles > 0) == (count <= 5), (count, cycles)

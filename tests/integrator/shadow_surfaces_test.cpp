@@ -128,5 +128,17 @@ TEST(ShadowSurfaces, StopLightBehindAsManyAsAPathMayPass)
   }
 }
 
+TEST(ShadowSurfaces, BehindOneMoreAPathSeesWhatShines)
+{
+  for (const auto& [below, limit, is_seen] :
+       {std::tuple(1, 0, true), std::tuple(2, 0, false), std::tuple(4, 3, true), std::tuple(5, 3, false)}) {
+    Scene scene = scene_of(sheets_of(0, below), limit);
+    scene.lights.clear();
+    scene.instances.erase(scene.instances.begin());  // the floor
+    scene.environment.color = {1, 1, 1};
+    EXPECT_EQ(render_scene(scene, render_options(scene, 4, 1)).mean() > 0, is_seen) << below << " " << limit;
+  }
+}
+
 }  // namespace
 }  // namespace relief::test
