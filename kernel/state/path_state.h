@@ -118,7 +118,7 @@ enum PathFlag : std::uint32_t {
   kPathHiddenShift = 9,        ///< position of four bits, of a photon: Light::hidden_from
   kPathCovers = 1u << 13,      ///< an event after which the film is not clear, whatever is seen behind it
   kPathScattered = 1u << 14,   ///< the last scattering event was in a medium: the two bits of PathEvent mean nothing
-  kPathLast = 1u << 15,        ///< it may scatter in media, or pass surfaces, no more: what it meets is seen, but not lit
+  kPathLast = 1u << 15,        ///< it has scattered or passed as often as it may: what it meets is seen, but not lit
   kPathTranslucent = 1u << 16,  ///< PathEvent::kTransmission was by a diffuse lobe
   kPathTransparentShift = 17,   ///< position of the count of transparent surfaces
 };
