@@ -107,19 +107,19 @@ struct alignas(64) PathState {
 };
 
 enum PathFlag : std::uint32_t {
-  kPathSawSurface = 1u << 0,   ///< the AOVs of the first hit are written, or none will be, see shade_medium_scatter
-  kPathCounted = 1u << 1,      ///< coverage was added to the film's alpha
-  kPathOnlyDelta = 1u << 2,    ///< every scattering event so far was a delta one
-  kPathAfterSoft = 1u << 3,    ///< the last scattering event is one where photons are gathered
-  kPathCaustic = 1u << 4,      ///< after such an event, only sharp ones at casters: lights ahead are brought by photons
-  kPathSawFeature = 1u << 5,   ///< what a denoiser is told is written, see Aov::kDenoisingAlbedo
-  kPathEventShift = 6,         ///< position of the two bits of PathEvent
-  kPathPhoton = 1u << 8,       ///< it started at a light
-  kPathHiddenShift = 9,        ///< position of four bits, of a photon: Light::hidden_from
-  kPathCovers = 1u << 13,      ///< an event after which the film is not clear, whatever is seen behind it
-  kPathScattered = 1u << 14,   ///< the last scattering event was in a medium: the two bits of PathEvent mean nothing
-  kPathLast = 1u << 15,        ///< it has scattered or passed as often as it may: what it meets is seen, but not lit
-  kPathTranslucent = 1u << 16,  ///< PathEvent::kTransmission was by a diffuse lobe
+  kPathSawSurface = 1u << 0,  ///< the AOVs of the first hit are written, or none will be, see shade_medium_scatter
+  kPathCounted = 1u << 1,     ///< coverage was added to the film's alpha
+  kPathOnlyDelta = 1u << 2,   ///< every scattering event so far was a delta one
+  kPathAfterSoft = 1u << 3,   ///< the last scattering event is one where photons are gathered
+  kPathCaustic = 1u << 4,     ///< after such an event, only sharp ones at casters: lights ahead are brought by photons
+  kPathSawFeature = 1u << 5,  ///< what a denoiser is told is written, see Aov::kDenoisingAlbedo
+  kPathEventShift = 6,        ///< position of the two bits of PathEvent
+  kPathPhoton = 1u << 8,      ///< it started at a light
+  kPathHiddenShift = 9,       ///< position of four bits, of a photon: Light::hidden_from
+  kPathCovers = 1u << 13,     ///< an event after which the film is not clear, whatever is seen behind it
+  kPathScattered = 1u << 14,  ///< the last scattering event was in a medium: the two bits of PathEvent mean nothing
+  kPathLast = 1u << 15,       ///< it has scattered or passed as often as it may: what it meets is seen, but not lit
+  kPathTranslucent = 1u << 16,  ///< kTransmission was by a diffuse lobe
   kPathTransparentShift = 17,   ///< position of the count of transparent surfaces
 };
 
