@@ -10,6 +10,7 @@
 #include "integrator/flush_denormals.h"
 #include "integrator/media.h"
 #include "integrator/photon_guide.h"
+#include "scene/material_traits.h"
 
 namespace relief {
 
@@ -30,17 +31,33 @@ constexpr double kTrace = 1e-9;
 /// peak, 1/(4πα²) for what is reflected.
 double lobe_solid_angle(double alpha) { return std::min(12 * kPilotPi * alpha * alpha, 2 * kPilotPi); }
 
-/// Width α of the sharpest lobes of each group of casters, by the factors of their roughness.
-std::vector<double> sharpest_alphas(const Scene& scene, const PhotonSources& sources)
+/// Lobes of a group of casters.
+struct GroupLobes {
+  double alpha = 1;  ///< width of the sharpest, by the factors of their roughness
+  double ior = 0;    ///< of those that let light in; 0: none does
+};
+
+std::vector<GroupLobes> group_lobes(const Scene& scene, const PhotonSources& sources)
 {
-  std::vector<double> alphas(sources.targets.size(), 1.0);
+  std::vector<GroupLobes> groups(sources.targets.size());
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
     if (sources.target_of[i] < 0) continue;
     const Material& material = scene.materials[static_cast<std::size_t>(scene.instances[i].material_index)];
-    double& alpha = alphas[static_cast<std::size_t>(sources.target_of[i])];
-    alpha = std::min(alpha, static_cast<double>(material.roughness) * static_cast<double>(material.roughness));
+    GroupLobes& group = groups[static_cast<std::size_t>(sources.target_of[i])];
+    const auto roughness = static_cast<double>(material.roughness);
+    group.alpha = std::min(group.alpha, roughness * roughness);
+    if (material_lets_light_in(material)) group.ior = std::max(group.ior, static_cast<double>(material.ior));
   }
-  return alphas;
+  return groups;
+}
+
+/// How far a facet turns a path, over what a mirror's does, by 2 of its tilt. Where paths ask for a light beyond glass they are on
+/// their way out, and refraction turns them by η − 1; for one inside they are on their way in, and it is 1 − 1/η.
+double bending(const GroupLobes& lobes, bool is_light_inside)
+{
+  if (!(lobes.ior > 0)) return 1;
+  const double turn = std::abs(lobes.ior - 1) / (is_light_inside ? lobes.ior : 1.0);
+  return std::clamp(0.5 * turn, 0.05, 1.0);
 }
 
 /// Least width α of what paths see after a diffuse bounce: as path_blur.
@@ -55,17 +72,22 @@ std::vector<float> pilot_factors(const SceneContext& context,
                                  const PhotonSources& sources,
                                  const RenderSettings& settings)
 {
-  const std::vector<double> alphas = sharpest_alphas(context.scene, sources);
+  const std::vector<GroupLobes> lobes = group_lobes(context.scene, sources);
   const LightsView lights = context.lights.view();
   std::vector<float> factors;
   for (const PhotonSource& source : sources.sources) {
-    const double alpha = std::max(alphas[source.target], blurred_alpha(static_cast<double>(settings.filter_glossy)));
-    Light storage;
-    const CausticLight light =
-        source.light.light_index < 0
-            ? CausticLight{4 * context.lights.environment_flux_density,
-                           std::max(context.lights.environment_solid_angle, lobe_solid_angle(alpha))}
-            : caustic_light(lights_at(lights, source.light, storage, 0.5f), sources.targets[source.target], alpha);
+    const GroupLobes& of_group = lobes[source.target];
+    const Box3& box = sources.targets[source.target];
+    const double alpha = std::max(of_group.alpha, blurred_alpha(static_cast<double>(settings.filter_glossy)));
+    CausticLight light;
+    if (source.light.light_index < 0) {
+      light = {4 * context.lights.environment_flux_density,
+               std::max(context.lights.environment_solid_angle, lobe_solid_angle(bending(of_group, false) * alpha))};
+    } else {
+      Light storage;
+      const Light& lamp = lights_at(lights, source.light, storage, 0.5f);
+      light = caustic_light(lamp, box, bending(of_group, box_contains(box, lamp.P)) * alpha);
+    }
     factors.push_back(static_cast<float>(
         kTrace * caustic_second_moment(light, static_cast<double>(settings.clamp_indirect), settings.samples)));
   }
@@ -81,26 +103,41 @@ struct Pilot {
   double stored = 0;         ///< photons
 };
 
-/// @param mean_factor  of the photons that carry the light
+/// @param mean_factor  of the photons that carry the light; 0: all of theirs, and the beauty has it
 Pilot pilot_read(Film& film, double mean_factor)
 {
   Pilot pilot;
-  pilot.seen_error = film.estimate_error().relmse * kPilotSamples;
   const FilmAccumulatorView sums = film.accumulator();
+  double least_seen = 0, most_seen = 0;
+  const auto squared = [](double x) { return x * x; };
   for (std::uint32_t p = 0; p < film.num_pixels(); ++p) {
     const float* record = film_record(sums, p);
     for (int c = 0; c < 3; ++c) {
-      const double paths = static_cast<double>(record[AccumulatorLayout::kBeauty + c]) / kPilotSamples;
-      const double squares = static_cast<double>(record[sums.layout.caustic + c]) / kPilotSamples / kTrace;
-      const double caustic = squares / mean_factor;
-      const double scale = 1 / ((paths + caustic) * (paths + caustic) + 0.01);
-      pilot.caustic_error += squares * scale;
-      pilot.photon_error += caustic * caustic * scale;
+      const auto sum_of = [&](int quantity) { return static_cast<double>(record[quantity + c]); };
+      double caustic = 0;
+      if (mean_factor > 0) {
+        const double squares = sum_of(sums.layout.caustic) / kPilotSamples / kTrace;
+        caustic = squares / mean_factor;
+        const double scale = 1 / (squared(sum_of(AccumulatorLayout::kBeauty) / kPilotSamples + caustic) + 0.01);
+        pilot.caustic_error += squares * scale;
+        pilot.photon_error += caustic * caustic * scale;
+      }
+      // What a half's quarters differ by, beside the other half and beside its own: the other may miss what is small and bright,
+      // and a firefly is none beside its own light.
+      constexpr double kHalf = kPilotSamples / 2;
+      const double even = sum_of(AccumulatorLayout::kEven), odd = sum_of(AccumulatorLayout::kBeauty) - even;
+      const double even_error = squared(2 * sum_of(AccumulatorLayout::kQuarter0) - even) / kPilotSamples;
+      const double odd_error = squared(2 * sum_of(AccumulatorLayout::kQuarter1) - odd) / kPilotSamples;
+      const double beside_even = squared(even / kHalf + caustic) + 0.01;
+      const double beside_odd = squared(odd / kHalf + caustic) + 0.01;
+      most_seen += even_error / beside_odd + odd_error / beside_even;
+      least_seen += even_error / beside_even + odd_error / beside_odd;
     }
   }
   // Some 24 photons stand for a density, weighed by Epanechnikov's kernel: a relative variance of 4/3 over their number.
   constexpr double kDensityVariance = 4.0 / 3 / 24;
   const double count = 3.0 * static_cast<double>(film.num_pixels());
+  pilot.seen_error = std::sqrt(least_seen * most_seen) / count;
   pilot.caustic_error /= count;
   pilot.photon_error *= kDensityVariance / count;
   return pilot;
@@ -147,8 +184,7 @@ Pilot pilot_run(const SceneContext& context,
   const StageTable& stages = stage_table_select();
   const Media media(context);
   tbb::enumerable_thread_specific<Wavefront> workers([&] { return pilot_worker(context, media, stop); });
-  // Where they carry what they have, it is the beauty alone that is asked for.
-  double factors = sources.factors.empty() ? kTrace : 0.0;
+  double factors = 0;
   for (std::size_t i = 0; i < sources.factors.size(); ++i) {
     factors += static_cast<double>(sources.factors[i]) * (sources.cdf[i + 1] - sources.cdf[i]);
   }
@@ -172,8 +208,15 @@ Pilot pilot_run(const SceneContext& context,
 }
 
 /// Cost of a sample with photons over that of one without, by the rays that both take.
-/// @param photons_a_sample  started
-double cost_ratio(const Pilot& pilot, bool has_media, double samples, double photons_a_sample)
+struct PhotonCosts {
+  double searches = 0;  ///< in samples' costs
+  double photons = 0;   ///< likewise, of all that are wanted
+
+  double ratio(double share) const { return 1 + searches + share * photons; }
+};
+
+/// @param photons_a_sample  wanted
+PhotonCosts photon_costs(const Pilot& pilot, bool has_media, double samples, double photons_a_sample)
 {
   // In rays of camera paths, shading included. Measured on scenes of few and of many objects and lamps: a photon's ray is one
   // to 1.8 of them, a photon that is kept 0.5 (it is sorted into the map), a search for photons 0.7 to 2.
@@ -185,7 +228,19 @@ double cost_ratio(const Pilot& pilot, bool has_media, double samples, double pho
   // In media each ray is one as well.
   const std::uint64_t in_media = has_media ? c.camera_rays + c.bounce_rays : 0;
   const double searches = kSearch * static_cast<double>(c.surface_hits + in_media);
-  return 1 + (searches + of_photons * photons_a_sample * samples) / rays;
+  return {searches / rays, of_photons * photons_a_sample * samples / rays};
+}
+
+/// Part of the photons that are wanted which leaves the least squared error × cost. Beside noise that photons do not take away
+/// fewer will do.
+double best_share(const Pilot& pilot, double seen_error, const PhotonCosts& costs, double least)
+{
+  double best = 1;
+  const auto effort = [&](double share) { return (seen_error + pilot.photon_error / share) * costs.ratio(share); };
+  for (const double share : {0.5, 0.25}) {
+    if (effort(std::max(share, least)) < effort(best)) best = std::max(share, least);
+  }
+  return best;
 }
 
 /// Sends photons where the picture shows them, see photon_sources_guide.
@@ -261,11 +316,20 @@ struct LightSeen {
   double irradiance, solid_angle;
 };
 
-/// Distance between a light and the middle of a box, but no less than the box is large.
+/// Distance at which a light shines on what a box holds: as near as its faces on each side, if it is inside; else no further than
+/// the middle, and no more than twice as far as the nearest point, within which a plane there has half of the light.
 double distance_to_box(const Light& light, const Box3& box)
 {
-  const double radius = 0.5 * static_cast<double>(length(box.high - box.low));
-  return std::max({static_cast<double>(length(0.5f * (box.low + box.high) - light.P)), radius, 1e-30});
+  // A lamp that touches is near one point alone.
+  const double least = std::max(1e-3 * static_cast<double>(length(box.high - box.low)), 1e-30);
+  const Vec3f nearest = max(box.low, min(light.P, box.high));
+  const auto outside = static_cast<double>(length(nearest - light.P));
+  if (outside > 0) {
+    const auto to_middle = static_cast<double>(length(0.5f * (box.low + box.high) - light.P));
+    return std::max(std::min(2 * outside, to_middle), least);
+  }
+  const Vec3f inside = min(light.P - box.low, box.high - light.P);
+  return std::max(static_cast<double>(inside.x + inside.y + inside.z) / 3, least);
 }
 
 LightSeen light_seen(FarLight, const Light& light, const Box3&)
@@ -286,7 +350,7 @@ LightSeen light_seen(FlatLight, const Light& light, const Box3& box)
   const double distance = distance_to_box(light, box);
   const auto along = static_cast<double>(std::abs(dot(0.5f * (box.low + box.high) - light.P, light.axis)));
   const double omega =
-      static_cast<double>(light.area) * std::max(kLeastCosine, along / distance) / (distance * distance);
+      static_cast<double>(light.area) * std::clamp(along / distance, kLeastCosine, 1.0) / (distance * distance);
   return {omega, omega};
 }
 
@@ -351,10 +415,18 @@ PhotonChoice photon_choice_make(const SceneContext& context,
   const auto run = [&](const PhotonSources& sources, double paths) {
     return pilot_run(context, options, g, sources, static_cast<std::uint32_t>(paths), paths / kPilotSamples, stop);
   };
+  // As many photons as a small picture has show what there is.
+  constexpr double kFewest = 1 << 14;
+  const double wanted = photons_wanted(settings);
+  const double least_share = settings.caustics.photons > 0 ? 1.0 : std::min(1.0, kFewest / wanted);
   Pilot pilot;
+  PhotonCosts costs;
   double without = 0;
-  const auto error_ratio = [&](double seen_error) {
-    return without / std::max(seen_error + pilot.photon_error, 1e-30);
+  const auto compare = [&](double seen_error) {
+    const double share = best_share(pilot, seen_error, costs, least_share);
+    choice.sources.share = share;
+    choice.cost_ratio = costs.ratio(share);
+    choice.error_ratio = without / std::max(seen_error + pilot.photon_error / share, 1e-30);
   };
   for (const double part : {0.25, 1.0}) {
     const double paths = part * whole;
@@ -367,10 +439,9 @@ PhotonChoice photon_choice_make(const SceneContext& context,
       return choice;
     }
     without = pilot.seen_error + pilot.caustic_error;
-    choice.cost_ratio =
-        cost_ratio(pilot, shows_photons_in_media(context.scene), paths, photons_wanted(settings) / num_pixels);
+    costs = photon_costs(pilot, shows_photons_in_media(context.scene), paths, wanted / num_pixels);
     // At best: no more is seen of the noise than without caustics.
-    choice.error_ratio = error_ratio(pilot.seen_error);
+    compare(pilot.seen_error);
     constexpr double kByFar = 0.6;
     if (choice.error_ratio > (part < 1 ? kByFar : 1.0) * choice.cost_ratio) continue;
     leave_to_paths("left to paths: photons would " + figures(" at best"));
@@ -378,7 +449,7 @@ PhotonChoice photon_choice_make(const SceneContext& context,
   }
   // With photons a path that comes by chance to a bright caustic has noise of its own.
   const Pilot shown = run(choice.sources, whole);
-  choice.error_ratio = error_ratio(std::max(shown.seen_error, pilot.seen_error));
+  compare(std::max(shown.seen_error, pilot.seen_error));
   if (choice.error_ratio <= choice.cost_ratio) {
     leave_to_paths("left to paths: photons would " + figures(""));
     return choice;

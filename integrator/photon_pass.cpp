@@ -228,7 +228,7 @@ std::uint32_t photon_turn_samples(double active)
 PhotonPass::PhotonPass(const SceneContext& context, const RenderSettings& settings, PhotonSources sources)
     : context_(context), settings_(settings.caustics), sources_(std::move(sources))
 {
-  photons_a_pass_ = static_cast<std::uint32_t>(photons_wanted(settings));
+  photons_a_pass_ = static_cast<std::uint32_t>(sources_.share * photons_wanted(settings));
   if (settings.noise_threshold > 0) settings_.memory_mib /= kMaps;
 }
 

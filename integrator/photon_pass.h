@@ -30,6 +30,7 @@ struct PhotonSources {
   /// Photons that are to lie within the radius of one in the first pass. On the scenes of benchmarks/caustics 16 to 32 had the
   /// least error from 1 to 64 passes with alpha = 3/4: more blurred, fewer left noise.
   double within = 24;
+  double share = 1;  ///< of photons_wanted, that a pass is to start
 
   PhotonSourcesView view(double photons_a_pass) const;
 };
