@@ -135,7 +135,7 @@ RELIEF_KERNEL void surface_interaction_see(const PathState& state, std::uint32_t
     // Leaves that are images are read finely, as shadow rays read them: a blurred edge lets paths through and asks for light as
     // well, at every leaf behind the other. A forest took three times as many shadow rays as with edges that are sharp.
     if (at.material->transparency_index >= 0) return;
-    const float footprint = ray_cone_footprint_world(at.cone, dot(wo, at.side.Ng));
+    const float footprint = kReadOfCone * ray_cone_footprint_world(at.cone, dot(wo, at.side.Ng));
     at.uv_width[0] = footprint * at.hit.area_ratio[0];
     at.uv_width[1] = footprint * at.hit.area_ratio[1];
   }
