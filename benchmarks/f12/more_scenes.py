@@ -1,4 +1,4 @@
-"""Eleven more scenes, as those of scenes.py, which writes them."""
+"""Twelve more scenes, as those of scenes.py, which writes them."""
 
 import math
 import random
@@ -308,6 +308,78 @@ def forest():
     stage.camera((0, -9, 2.2), (0, 0, 3), 32)
 
 
+def _packed(name, pixels, is_color=True):
+    """An 8-bit image of (height, width, 3) values, packed into the file."""
+    height, width, _ = pixels.shape
+    image = bpy.data.images.new(name, width, height)
+    if not is_color:
+        image.colorspace_settings.name = "Non-Color"
+    image.pixels.foreach_set(np.dstack((pixels, np.ones((height, width)))).astype(np.float32).ravel())
+    image.pack()
+    return image
+
+
+def _parquet():
+    """Planks as people load them: images of colour, roughness and normals, repeated by a Mapping node."""
+    size = 1024
+    v, u = np.mgrid[0:size, 0:size] / size
+    chance = np.random.default_rng(5)
+    row = (v * 8).astype(int)
+    plank = (row * 3 + ((u * 2 + row * 0.37) % 2).astype(int)) % 24
+    tone = chance.uniform(0.6, 1.0, 24)[plank]
+    grain = np.sin(2 * np.pi * (60 * v + 3 * np.sin(2 * np.pi * u) + plank)) * np.sin(2 * np.pi * (7 * u + plank))
+    across, along = (v * 8) % 1, (u * 2 + row * 0.37) % 1
+    gap = (np.minimum(across, 1 - across) < 0.02) | (np.minimum(along, 1 - along) < 0.004)
+    height = np.where(gap, -1.0, 0.15 * grain)
+    color = np.where(gap[..., None], 0.02, (tone * (0.8 + 0.2 * grain))[..., None] * np.array((0.62, 0.4, 0.24)))
+    slopes = [np.roll(height, 1, axis) - np.roll(height, -1, axis) for axis in (1, 0)]
+    normal = np.dstack((*slopes, np.full_like(height, 2.0)))
+    normal = 0.5 + 0.5 * normal / np.linalg.norm(normal, axis=2, keepdims=True)
+    roughness = np.repeat(np.where(gap, 0.9, 0.25 + 0.1 * grain)[..., None], 3, 2)
+    t = NodeTree("parquet")
+    place = t.node("Mapping", {0: t.node("TexCoord").outputs["UV"], "Scale": (4, 4, 4)}).outputs[0]
+    looks = []
+    for name, pixels in (("color", color), ("roughness", roughness), ("normal", normal)):
+        looks.append(t.node("TexImage", {0: place}))
+        looks[-1].image = _packed(f"parquet {name}", pixels, name == "color")
+    bumped = t.node("NormalMap", {"Color": looks[2].outputs[0], "Strength": 0.6})
+    return t.end(t.principled(looks[0].outputs[0], looks[1].outputs[0], Normal=bumped.outputs[0]))
+
+
+def _painting(number):
+    """A picture of fine and coarse lines, letters and patches."""
+    v, u = np.mgrid[0:768, 0:1024] / 1024
+    chance = np.random.default_rng(number)
+    color = np.ones((768, 1024, 3)) * chance.uniform(0.1, 0.9, 3)
+    for _ in range(60):
+        x, y, w, h = chance.uniform(0, 1), chance.uniform(0, 0.75), chance.exponential(0.08), chance.exponential(0.08)
+        inside = (abs(u - x) < w) & (abs(v - y) < h)
+        stripes = 0.5 + 0.5 * np.sign(np.sin(2 * np.pi * chance.integers(10, 120) * (u if chance.random() < 0.5 else v)))
+        color = np.where(inside[..., None], chance.uniform(0, 1, 3) * (0.3 + 0.7 * stripes)[..., None], color)
+    t = NodeTree("painting")
+    look = t.node("TexImage")
+    look.image = _packed("painting", color)
+    return t.end(t.principled(look.outputs[0], 0.6))
+
+
+def gallery():
+    stage.begin((0.8, 0.85, 0.95), 0.15)
+    stage.room_shell(stage.plaster("wall", (0.8, 0.79, 0.77)), stage.plaster("under"), 7.0, 7.0, 3.2)
+    stage.add("plane", _parquet(), (0, 0, 0.005), smooth=False, size=6.9)
+    for i in range(5):
+        stage.add("plane", _painting(i), (-2.6 + 1.3 * i, 3.49, 1.5), (0.5, 0.4, 1), (90, 0, 0), smooth=False)
+    for i in range(3):
+        stage.add("plane", _painting(9 + i), (3.49, -1.5 + 1.8 * i, 1.5), (0.6, 0.5, 1), (90, 0, -90), smooth=False)
+    bench = stage.plastic("bench", (0.04, 0.04, 0.045), 0.2)
+    stage.box(bench, (-0.9, 0.4, 0.38), (0.9, 0.9, 0.46))
+    for x in (-0.85, 0.75):
+        stage.box(bench, (x, 0.45, 0), (x + 0.1, 0.85, 0.38))
+    for x in (-2.0, 0.0, 2.0):
+        stage.lamp("AREA", (x, 0.5, 3.15), (x, 0.5, 0), 60, shape="RECTANGLE", size=0.3, size_y=4.0)
+    stage.camera((-1.4, -3.2, 1.55), (0.5, 2.0, 1.1), 26)
+
+
 SCENES = {
-    f.__name__: f for f in (product, night, garden, character, bottle, scan, isometric, logo, corridor, macro, forest)
+    f.__name__: f
+    for f in (product, night, garden, character, bottle, scan, isometric, logo, corridor, macro, forest, gallery)
 }
