@@ -302,10 +302,12 @@ RELIEF_KERNEL float graph_quantity(const GraphPoint& at, GraphQuantity quantity,
 
 /// As graph_load_point, of a program that reads points beside it.
 /// @param at  whose P_object is set
+template <typename Wanted>
 RELIEF_KERNEL void graph_load_shifted(const GraphProgramView& program,
                                       GraphPoint at,
                                       int lane,
-                                      GraphRegisters& registers)
+                                      GraphRegisters& registers,
+                                      const Wanted& wanted)
 {
   const GraphFootprint footprint = graph_footprint(at);
   // Whatever else a point has, it is on the same triangle.
@@ -316,6 +318,7 @@ RELIEF_KERNEL void graph_load_shifted(const GraphProgramView& program,
   float width = -1.0f;  // by which the points are moved
   for (std::uint32_t i = 0; i < program.num_inputs; ++i) {
     const GraphInput input = program.inputs[i];
+    if (!wanted(input)) continue;
     // Few programs have bumps of several widths.
     if (input.shift != GraphShift::kNone && input.width != width) {
       width = input.width;
@@ -328,15 +331,29 @@ RELIEF_KERNEL void graph_load_shifted(const GraphProgramView& program,
 }
 
 /// Writes a point's quantities to its lane of the registers.
-RELIEF_KERNEL void graph_load_point(const GraphProgramView& program, GraphPoint at, int lane, GraphRegisters& registers)
+/// @param wanted  inputs that are written
+template <typename Wanted>
+RELIEF_KERNEL void graph_load_point(const GraphProgramView& program,
+                                    GraphPoint at,
+                                    int lane,
+                                    GraphRegisters& registers,
+                                    const Wanted& wanted)
 {
   if (program.num_inputs == 0) return;
   at.P_object = transform_point(at.instance->object_from_world, at.hit->P);
-  if (program.is_shifted) return graph_load_shifted(program, at, lane, registers);
+  if (program.is_shifted) return graph_load_shifted(program, at, lane, registers, wanted);
   for (std::uint32_t i = 0; i < program.num_inputs; ++i) {
     const GraphInput& input = program.inputs[i];
+    if (!wanted(input)) continue;
     registers.lanes[input.register_index][lane] = graph_quantity(at, input.quantity, input.index);
   }
+}
+RELIEF_KERNEL void graph_load_point(const GraphProgramView& program,
+                                    const GraphPoint& at,
+                                    int lane,
+                                    GraphRegisters& registers)
+{
+  graph_load_point(program, at, lane, registers, [](const GraphInput&) { return true; });
 }
 
 /// A graph at one point alone.

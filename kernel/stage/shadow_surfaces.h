@@ -2,7 +2,7 @@
 #pragma once
 
 #include "kernel/globals.h"
-#include "kernel/graph/graph_material.h"
+#include "kernel/graph/graph_load.h"
 #include "kernel/shape/surface_hits.h"
 
 namespace relief {
@@ -44,12 +44,23 @@ RELIEF_KERNEL void shadow_surfaces_pass(const KernelGlobals& g, const ShadowSurf
   shadow_surfaces_locate(s, hits);
   // As in Cycles, what shadow rays meet does not look around: there are no rays for its graphs.
   GraphRegisters registers;
-  for (int k = 0; k < s.count; ++k) {
+  const auto point_of = [&](int k) {
     const PrimitivePlace place{s.places.mesh[k], s.places.triangle[k], s.places.bary_u[k], s.places.bary_v[k]};
     GraphRay ray = s.rays[k];
     ray.length = length(hits[k].P - s.O[k]);
-    graph_load_point(program, {place, s.places.instance[k], &hits[k], -s.D[k], {0.0f, 0.0f}, 0.0f, &g.graph_scene, ray},
-                     k, registers);
+    return GraphPoint{place, s.places.instance[k], &hits[k], -s.D[k], {0.0f, 0.0f}, 0.0f, &g.graph_scene, ray};
+  };
+  if (s.count > 2) {
+    GraphPlaces places{};
+    for (int k = 0; k < 8; ++k) {
+      const int i = k < s.count ? k : 0;
+      places.hit[k] = &hits[i];
+      places.instance[k] = s.places.instance[i];
+      places.wo[k] = -s.D[i];
+    }
+    graph_load_points(program, places, s.count, point_of, registers);
+  } else {
+    for (int k = 0; k < s.count; ++k) graph_load_point(program, point_of(k), k, registers);
   }
   registers.used = (1u << s.count) - 1;
   g.run_graph(program, g.textures, registers);

@@ -7,7 +7,7 @@
 #include "kernel/bsdf/surface_params.h"
 #include "kernel/feature_mask.h"
 #include "kernel/globals.h"
-#include "kernel/graph/graph_material.h"
+#include "kernel/graph/graph_load.h"
 #include "kernel/sample/dimensions.h"
 #include "kernel/sample/sobol.h"
 #include "kernel/shape/facet_masking.h"
@@ -250,10 +250,21 @@ RELIEF_KERNEL void surface_graph_run(const KernelGlobals& g,
                                      const SurfaceInteraction* located,
                                      GraphRegisters& registers)
 {
-  for (int k = 0; k < count; ++k) {
-    const std::uint32_t path = paths[k];
-    graph_load_point(program, surface_graph_point(g, state, path, located[k], -path_direction(state, path)), k,
-                     registers);
+  const auto point_of = [&](int k) {
+    return surface_graph_point(g, state, paths[k], located[k], -path_direction(state, paths[k]));
+  };
+  if (count > 2) {
+    GraphPlaces places;
+    for (int k = 0; k < 8; ++k) {
+      const int i = k < count ? k : 0;
+      places.hit[k] = &located[i].hit;
+      places.instance[k] = located[i].instance;
+      places.wo[k] = -path_direction(state, paths[i]);
+      places.footprint[k] = located[i].cone.width;
+    }
+    graph_load_points(program, places, count, point_of, registers);
+  } else {
+    for (int k = 0; k < count; ++k) graph_load_point(program, point_of(k), k, registers);
   }
   registers.used = (1u << count) - 1;
   g.run_graph(program, g.textures, registers);
