@@ -110,33 +110,29 @@ void shade_group(const KernelGlobals& g,
                  HitColumns& hits,
                  const SurfaceSinks& sinks)
 {
-  const SurfaceClosureSpec* closure = nullptr;
   if constexpr ((kFeatures & kFeatureMixture) != 0) {
     // Fewer are not worth it.
-    closure = group.count > 2 ? closures_with_columns(group.program) : nullptr;
+    const std::uint64_t closures = __builtin_popcount(group.lanes) > 2 ? closures_with_columns(group.program) : 0;
     MixtureBuildLanes b;
-    if (closure != nullptr) {
+    if (closures != 0) {
       b = surface_group_build(g, state, group);
-      closures_resolve_columns(group.program, *closure, group.registers, b, hits.lobes);
+      closures_resolve_columns(group.program, closures, group.registers, b, hits.lobes);
     }
-    if constexpr ((kFeatures & kFeatureCaustics) == 0) {
-      MixtureLobes lists[kLanes];
-      if (closure != nullptr && surface_group_is_resolved(g, state, group, *closure)) {
-        surface_group_resolve<kFeatures>(g, state, group, b, hits);
-      } else if (!surface_group_resolve<kFeatures>(g, state, group, closure != nullptr ? &hits.lobes : nullptr, lists,
-                                                   hits)) {
-        for (int k = 0; k < group.count; ++k) {
-          shade_surface_listed<kFeatures>(g, state, group.paths[k], group.at[k], lists[k], sinks);
-        }
-        return;
-      }
-      shade_surface_group<kFeatures>(g, state, group, hits, sinks);
+    MixtureLobes lists[kLanes];
+    if (closures != 0 && surface_group_is_resolved(g, state, group, closures)) {
+      surface_group_resolve<kFeatures>(g, state, group, b, hits);
+    } else if (!surface_group_resolve<kFeatures>(g, state, group, closures != 0 ? &hits.lobes : nullptr, lists, hits)) {
+      surface_group_visit(group, [&](int k) {
+        shade_surface_listed<kFeatures>(g, state, group.paths[k], group.at[k], lists[k], sinks);
+      });
       return;
     }
-  }
-  for (int k = 0; k < group.count; ++k) {
-    const GraphHit hit{{&group.program, &group.registers, k}, closure != nullptr ? &hits.lobes : nullptr};
-    shade_surface<kFeatures>(g, state, group.paths[k], group.at[k], sinks, &hit);
+    shade_surface_group<kFeatures>(g, state, group, hits, sinks);
+  } else {
+    surface_group_visit(group, [&](int k) {
+      const GraphHit hit{{&group.program, &group.registers, k}};
+      shade_surface<kFeatures>(g, state, group.paths[k], group.at[k], sinks, &hit);
+    });
   }
 }
 
@@ -145,13 +141,13 @@ void shade_group(const KernelGlobals& g,
 /// @return  lanes of the others, bit by bit
 unsigned pass_clear(const KernelGlobals& g, PathState& state, const SurfaceGroup& group, const SurfaceSinks& sinks)
 {
-  unsigned others = group.registers.used;
+  unsigned others = group.lanes;
   if (const Material& material = *group.at[0].material;
       material.transparency_index < 0 || !is_zero(material.emission)) {
     return others;
   }
   const unsigned clear = closures_clear(group.program, group.registers);
-  for (int k = 0; k < group.count; ++k) {
+  for (int k = 0; k < static_cast<int>(kLanes); ++k) {
     if ((clear >> k & 1u) == 0 || (group.at[k].instance->flags & kHoldout) != 0) continue;
     const Vec3f passes = closures_transparency({&group.program, &group.registers, k});
     if (!(max_component(passes) > 0.0f)) continue;
@@ -195,18 +191,8 @@ void shade_surfaces_by_graph(const KernelGlobals& g,
     surface_graph_run(g, state, program, queue.paths + first, static_cast<int>(count), located, registers);
     sinks.counters.graph_runs += 1;
     sinks.counters.graph_points += count;
-    const SurfaceGroup group{queue.paths + first, static_cast<int>(count), located, program, registers};
-    if constexpr ((kFeatures & kFeatureMixture) != 0) {
-      const unsigned all = registers.used, others = pass_clear(g, state, group, sinks);
-      if (others != all) {
-        for (int k = 0; k < group.count; ++k) {
-          if ((others >> k & 1u) == 0) continue;
-          const GraphHit hit{{&program, &registers, k}};
-          shade_surface<kFeatures>(g, state, group.paths[k], located[k], sinks, &hit);
-        }
-        continue;
-      }
-    }
+    SurfaceGroup group{queue.paths + first, located, program, registers, registers.used};
+    if constexpr ((kFeatures & kFeatureMixture) != 0) group.lanes = pass_clear(g, state, group, sinks);
     shade_group<kFeatures>(g, state, group, hits, sinks);
   }
 }

@@ -208,16 +208,17 @@ struct Resolved {
                                                    Resolved* resolved,
                                                    HitColumns& columns)
 {
-  const SurfaceClosureSpec* const closure = closures_with_columns(program);
-  const bool is_resolved = closure != nullptr && closure_scatters_alone(program, *closure);
+  const std::uint64_t closures = closures_with_columns(program);
+  const bool is_resolved = closures != 0 && closures_scatter_alone(program, closures);
   if (is_resolved) {
     MixtureBuildLanes b{{}, splat8(Vec3f{0, 0, 1}), {}, g.bsdf_tables};
     for (int k = 0; k < 8; ++k) {
       lane_set(b.wo, k, hits[k].wo);
       lane_set(b.Ns, k, hits[k].Ns);
     }
-    closures_resolve_columns(program, *closure, registers, b, columns.lobes);
-    hit_columns_begin(b, frame_from_normal(shading_normal_towards(b.Ns, b.wo)), splat8(sight.blur.alpha), columns);
+    closures_resolve_columns(program, closures, registers, b, columns.lobes);
+    hit_columns_begin(b, frame_from_normal(shading_normal_towards(b.Ns, b.wo)), splat8(sight.blur.alpha), splat8(-1.0f),
+                      columns);
   }
   for (int k = 0; k < 8; ++k) {
     SurfaceInteraction& at = resolved[k].at;
@@ -241,12 +242,13 @@ struct Resolved {
                                                     HitColumns& columns)
 {
   for (int k = 0; k < 8; ++k) {
-    store_lane(columns.to_lamp, k, hits[k].light);
+    store_lane(columns.to[0], k, hits[k].light);
     columns.u[0][k] = hits[k].u.x;
     columns.u[1][k] = hits[k].u.y;
+    columns.u[2][k] = hits[k].u_branch;
   }
-  hit_columns_light(columns);
-  hit_columns_sample(columns);
+  hit_columns_ask<HitTowards::kLamp>(columns);
+  hit_columns_sample<false>(columns);
   float sum = 0.0f;
   for (int k = 0; k < 8; ++k) {
     const HitLane lane{&columns, k, 1.0f / resolved[k].at.params.alpha};

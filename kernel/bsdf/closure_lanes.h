@@ -11,6 +11,7 @@ namespace relief {
 struct MixtureBuildLanes {
   Vec3x8 wo, Ng, Ns;
   const BsdfTables* tables = nullptr;  ///< for closures since 4.0
+  I8 is_front = ~I8{};
 };
 
 RELIEF_KERNEL F8 lerp(F8 t, F8 a, F8 b) { return (1.0f - t) * a + t * b; }

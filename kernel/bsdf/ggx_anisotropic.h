@@ -10,7 +10,7 @@
 namespace relief {
 
 /// How masking of both directions is combined.
-enum class SmithMasking {
+enum class SmithMasking : std::uint8_t {
   kSeparable,   ///< G1(wo) G1(wi): Cycles up to 3.6
   kCorrelated,  ///< by height: Cycles from 4.0 on, and relief's own lobes
 };

@@ -1,14 +1,17 @@
 // Lobes of eight hits in columns: a column is one lobe of each, all of one kind, though some hits may not have it. Most materials are
 // two or three columns: a diffuse base, a reflection, a coat or sheen. Closures that resolve eight hits at once make them
-// (principled3_lanes.h, principled4_lanes.h), or they are taken from the lists that mixture_make.h makes; hit_columns.h evaluates and samples them.
+// (plain_lanes.h, principled3_lanes.h, principled4_lanes.h), or they are taken from the lists that mixture_make.h makes;
+// hit_columns.h evaluates and samples them.
 #pragma once
+
+#include <type_traits>
 
 #include "kernel/bsdf/closure_lanes.h"
 
 namespace relief {
 
-/// As many as a Principled closure may need.
-inline constexpr int kMostLobeColumns = 5;
+/// As many as two Principled closures mostly need, or one and glass.
+inline constexpr int kMostLobeColumns = 8;
 
 /// What the lobes of a column have in common; see MixtureLobe.
 struct LobeColumnKind {
@@ -17,24 +20,28 @@ struct LobeColumnKind {
   MixtureFresnel fresnel = MixtureFresnel::kNone;
   SmithMasking masking = SmithMasking::kSeparable;
   bool mirrors_below = false;
+  bool is_beckmann = false;  ///< of what refracts
 };
 
 RELIEF_KERNEL bool operator==(const LobeColumnKind& a, const LobeColumnKind& b)
 {
-  return a.kind == b.kind && a.maths == b.maths && a.fresnel == b.fresnel && a.masking == b.masking &&
-         a.mirrors_below == b.mirrors_below;
+  // One comparison: it is asked of every lobe of a list, and its answers are hard to foretell.
+  static_assert(std::has_unique_object_representations_v<LobeColumnKind>);
+  return __builtin_memcmp(&a, &b, sizeof a) == 0;
 }
 
 struct alignas(32) LobeColumn {
   LobeColumnKind is;
   int frame = 0;                         ///< of LobeColumns
+  int closure = 0;                       ///< of the material: what it was resolved of, if not taken from lists
   alignas(32) std::int32_t is_there[8];  ///< −1: the hit has such a lobe
   std::int32_t is_delta[8];              ///< likewise
   float probability[8], weight[3][8];    ///< 0 where it is not there
   float first_share[8];                  ///< as of MixtureLobe; of lobes of closures, which lists are made of
   float roughness[8];                    ///< perceptual; infinite: never sharp
   float shape[3][8];  ///< α along x and y; of diffuse Principled its roughness; of microfibres A, B, albedo
-  float eta[8], F0[3][8], edge[3][8];  ///< as of MicrofacetFresnel
+  float eta[8], F0[3][8], edge[3][8];  ///< as of MicrofacetFresnel; the edge of glass is the tint of what it reflects
+  float through[3][8];                 ///< of glass: the tint of what it refracts
 };
 
 /// Frames about one normal of each hit.
@@ -45,14 +52,18 @@ struct alignas(32) LobeFrames {
 };
 
 struct LobeColumns {
-  int first_result = 0;  ///< of the closure that they are resolved of, see SurfaceClosureSpec
+  std::uint64_t closures = 0;  ///< of the material, that they are resolved of, bit by bit
   int num_lobes = 0, num_frames = 0;
   LobeColumn lobes[kMostLobeColumns];  ///< in the order in which they are sampled
   LobeFrames frames[kMostLobeColumns];
 };
 
 /// Begins columns of which none is there.
-RELIEF_KERNEL void lobe_columns_begin(LobeColumns& c) { c.num_lobes = c.num_frames = 0; }
+RELIEF_KERNEL void lobe_columns_begin(LobeColumns& c)
+{
+  c.closures = 0;
+  c.num_lobes = c.num_frames = 0;
+}
 
 /// As diffuse closures see wo: as if from just above the horizon.
 RELIEF_KERNEL Vec3x8 lifted(const Vec3x8& wo)
@@ -138,6 +149,9 @@ RELIEF_KERNEL void lobe_column_scale(LobeColumn& lobe, const Vec3x8& by)
   lobe_column_favour(lobe, mean_component(by));
 }
 
+/// Whether indices match, of lobes that refract: see dielectric_is_matched.
+RELIEF_KERNEL I8 lobe_column_is_matched(const LobeColumn& lobe) { return abs(load8(lobe.eta) - 1.0f) < kMatchedEta; }
+
 /// As mixture_fresnel.
 RELIEF_KERNEL Vec3x8 lobe_column_fresnel(const LobeColumn& lobe, F8 cos_d)
 {
@@ -152,11 +166,12 @@ RELIEF_KERNEL Vec3x8 lobe_column_fresnel(const LobeColumn& lobe, F8 cos_d)
 }
 
 /// Adds one hit's lobes to a list, as its closure would.
-RELIEF_KERNEL void lobe_columns_list(const LobeColumns& c, int lane, MixtureBuild& b)
+RELIEF_KERNEL void lobe_columns_list(const LobeColumns& c, int closure, int lane, MixtureBuild& b)
 {
   MixtureLobes& all = *b.lobes;
   for (int i = 0; i < c.num_lobes; ++i) {
     const LobeColumn& column = c.lobes[i];
+    if (column.closure != closure) continue;
     if (column.is_there[lane] == 0 || all.size == kMostMixtureLobes) continue;
     const LobeFrames& f = c.frames[column.frame];
     MixtureLobe& lobe = *new (&all.lobes[all.size++]) MixtureLobe;
@@ -172,18 +187,27 @@ RELIEF_KERNEL void lobe_columns_list(const LobeColumns& c, int lane, MixtureBuil
     lobe.wo = load_lane(f.wo, lane);
     lobe.is_bent = f.is_bent[lane] != 0;
     if (lobe.is_bent) lobe.surface_N = load_lane(f.surface_N, lane);
+    const MixtureTraits& traits = mixture_traits(lobe.kind);
+    if (traits.sides != LobeSides::kReflect) b.transmits = true;
     const Vec3f shape = load_lane(column.shape, lane);
+    const AnisotropicAlpha alpha{shape.x, shape.y};
     if (lobe.kind == MixtureLobeKind::kLambert) {
       lobe.wo = normalize(Vec3f{lobe.wo.x, lobe.wo.y, max(lobe.wo.z, kLeastDiffuseCosine)});
     } else if (lobe.kind == MixtureLobeKind::kPrincipledDiffuse) {
       lobe.shape.principled_diffuse = {shape.x};
     } else if (lobe.kind == MixtureLobeKind::kMicrofibre) {
       lobe.shape.microfibre = {shape.x, shape.y, shape.z};
-    } else if (mixture_traits(lobe.kind).has_fresnel) {
-      lobe.fresnel = {column.is.fresnel, column.eta[lane], load_lane(column.F0, lane), {}, 1.0f, 0.0f};
+    } else if (lobe.kind == MixtureLobeKind::kRefraction) {
+      lobe.shape.refraction = {shape.x, column.eta[lane], column.is.is_beckmann, column.is.masking, false};
+    } else if (traits.has_fresnel) {
+      if (column.is.fresnel != MixtureFresnel::kNone) {
+        lobe.fresnel = {column.is.fresnel, column.eta[lane], load_lane(column.F0, lane), {}, 1.0f, 0.0f};
+      }
       if (column.is.fresnel == MixtureFresnel::kF82) lobe.fresnel.b = load_lane(column.edge, lane);
       if (lobe.kind == MixtureLobeKind::kGgx) {
-        lobe.shape.ggx = {{shape.x, shape.y}, column.is.masking};
+        lobe.shape.ggx = {alpha, column.is.masking};
+      } else if (lobe.kind == MixtureLobeKind::kBeckmann) {
+        lobe.shape.beckmann = {alpha, column.is.masking};
       } else {
         lobe.shape.clearcoat = {shape.x};
       }
@@ -198,6 +222,7 @@ RELIEF_KERNEL bool lobe_column_kind(const MixtureLobe& lobe, LobeColumnKind& is)
   is = {lobe.kind, lobe.maths};
   switch (lobe.kind) {
     case MixtureLobeKind::kLambert:
+    case MixtureLobeKind::kTranslucent:
     case MixtureLobeKind::kPrincipledSheen:
     case MixtureLobeKind::kMicrofibre:
       return true;
@@ -206,7 +231,18 @@ RELIEF_KERNEL bool lobe_column_kind(const MixtureLobe& lobe, LobeColumnKind& is)
     case MixtureLobeKind::kGgx:
       is.masking = lobe.shape.ggx.masking;
       break;
+    case MixtureLobeKind::kBeckmann:
+      is.masking = lobe.shape.beckmann.masking;
+      break;
     case MixtureLobeKind::kClearcoat:
+      break;
+    case MixtureLobeKind::kRefraction:
+      is.masking = lobe.shape.refraction.masking;
+      is.is_beckmann = lobe.shape.refraction.is_beckmann;
+      return !lobe.shape.refraction.lights_unconnected;
+    case MixtureLobeKind::kGlass:
+      is.masking = SmithMasking::kCorrelated;
+      is.is_beckmann = lobe.shape.glass.is_beckmann;
       break;
     default:
       return false;
@@ -248,11 +284,28 @@ RELIEF_KERNEL void lobe_column_take(LobeColumn& column, const LobesAcross& from)
       const SheenMicrofibre& fibres = lobe.shape.microfibre;
       store_lane(column.shape, k, {fibres.A, fibres.B, fibres.albedo});
     });
-  } else if (mixture_traits(column.is.kind).has_fresnel) {
-    const bool is_ggx = column.is.kind == MixtureLobeKind::kGgx;
+  } else if (column.is.kind == MixtureLobeKind::kRefraction) {
     visit([&](int k, const MixtureLobe& lobe) {
-      column.shape[0][k] = is_ggx ? lobe.shape.ggx.alpha.x : lobe.shape.clearcoat.alpha;
-      column.shape[1][k] = is_ggx ? lobe.shape.ggx.alpha.y : lobe.shape.clearcoat.alpha;
+      column.shape[0][k] = column.shape[1][k] = lobe.shape.refraction.alpha;
+      column.eta[k] = lobe.shape.refraction.eta;
+    });
+  } else if (column.is.kind == MixtureLobeKind::kGlass) {
+    visit([&](int k, const MixtureLobe& lobe) {
+      column.shape[0][k] = column.shape[1][k] = lobe.shape.glass.alpha;
+      column.eta[k] = lobe.fresnel.eta;
+      store_lane(column.F0, k, lobe.fresnel.a);
+      store_lane(column.edge, k, lobe.shape.glass.reflection_tint);
+      store_lane(column.through, k, lobe.shape.glass.transmission_tint);
+    });
+  } else if (mixture_traits(column.is.kind).has_fresnel) {
+    const MixtureLobeKind kind = column.is.kind;
+    visit([&](int k, const MixtureLobe& lobe) {
+      const float coat = lobe.shape.clearcoat.alpha;
+      const AnisotropicAlpha alpha = kind == MixtureLobeKind::kGgx        ? lobe.shape.ggx.alpha
+                                     : kind == MixtureLobeKind::kBeckmann ? lobe.shape.beckmann.alpha
+                                                                          : AnisotropicAlpha{coat, coat};
+      column.shape[0][k] = alpha.x;
+      column.shape[1][k] = alpha.y;
       column.eta[k] = lobe.fresnel.eta;
       store_lane(column.F0, k, lobe.fresnel.a);
       store_lane(column.edge, k, lobe.fresnel.b);

@@ -6,7 +6,7 @@
 
 namespace relief {
 
-/// As bump_shadowing of directions above the bent normal.
+/// As bump_shadowing.
 RELIEF_KERNEL F8 bump_shadowing(const Vec3x8& N, const Vec3x8& wi)
 {
   const F8 g = dot(N, wi) / (wi.z * N.z);
@@ -134,15 +134,21 @@ RELIEF_KERNEL Vec3x8 sheen_microfibre_sample(const Vec3x8& fibres, const Vec3x8&
   return select(across > 1e-6f, {cos_phi * w.x - sin_phi * w.y, sin_phi * w.x + cos_phi * w.y, w.z}, w);
 }
 
-/// As ggx_anisotropic_sample.
-RELIEF_KERNEL Vec3x8 ggx_anisotropic_sample(F8 alpha_x, F8 alpha_y, const Vec3x8& wo, F8 u_x, F8 u_y)
+/// As ggx_anisotropic_visible_normal.
+RELIEF_KERNEL Vec3x8 ggx_anisotropic_visible_normal(F8 alpha_x, F8 alpha_y, const Vec3x8& wo, F8 u_x, F8 u_y)
 {
   const Vec3x8 wo_std = normalize(Vec3x8{wo.x * alpha_x, wo.y * alpha_y, wo.z});
   const F8 z = 1.0f - u_y * (1.0f + wo_std.z);
   const F8 r = safe_sqrt((1.0f - z) * (1.0f + z));
   const SinCos8 phi = sin_cos_turn(u_x);
   const Vec3x8 m = Vec3x8{r * phi.cos, r * phi.sin, z} + wo_std;
-  const Vec3x8 wm = normalize(Vec3x8{m.x * alpha_x, m.y * alpha_y, max(m.z, splat8(0.0f))});
+  return normalize(Vec3x8{m.x * alpha_x, m.y * alpha_y, max(m.z, splat8(0.0f))});
+}
+
+/// As ggx_anisotropic_sample.
+RELIEF_KERNEL Vec3x8 ggx_anisotropic_sample(F8 alpha_x, F8 alpha_y, const Vec3x8& wo, F8 u_x, F8 u_y)
+{
+  const Vec3x8 wm = ggx_anisotropic_visible_normal(alpha_x, alpha_y, wo, u_x, u_y);
   return 2.0f * dot(wo, wm) * wm - wo;
 }
 

@@ -70,7 +70,6 @@ RELIEF_KERNEL void principled3_coat_add(LobeColumns& columns, const MixtureBuild
                                                               const Principled3Lanes& in,
                                                               LobeColumns& columns)
 {
-  lobe_columns_begin(columns);
   const int frame = lobe_frames_add(columns, b, closure_normal(b, in.normal));
   const I8 is_there = (in.weight > kLeastClosureWeight) & (in.weight < kInfinity);
   const F8 base_weight = 1.0f - saturated(in.metallic);

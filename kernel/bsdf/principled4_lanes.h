@@ -169,7 +169,6 @@ RELIEF_KERNEL Vec3x8 principled4_reflection_add(LobeColumns& columns,
                                                               const Principled4Lanes& in,
                                                               LobeColumns& columns)
 {
-  lobe_columns_begin(columns);
   const I8 is_there = (in.weight > kLeastClosureWeight) & (in.weight < kInfinity);
   const F8 start = is_there ? in.weight : splat8(0.0f);
   Vec3x8 weight{start, start, start};

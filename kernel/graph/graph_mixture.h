@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "kernel/bsdf/mixture_make.h"
+#include "kernel/bsdf/plain_lanes.h"
 #include "kernel/bsdf/principled3_lanes.h"
 #include "kernel/bsdf/principled4_lanes.h"
 #include "kernel/graph/graph_registers.h"
@@ -45,8 +46,8 @@ RELIEF_KERNEL Inputs closure_inputs(const GraphLane& at, const SurfaceClosureSpe
     const float weight = graph_result(at, spec.first_result);
     if (!(weight > kLeastClosureWeight && weight < kInfinity)) continue;
     build.maths = spec.maths;
-    if (columns != nullptr && columns->first_result == spec.first_result) {
-      if (build.lobes != nullptr) lobe_columns_list(*columns, at.lane, build);
+    if (columns != nullptr && i < 64 && (columns->closures >> i & 1u) != 0) {
+      if (build.lobes != nullptr) lobe_columns_list(*columns, static_cast<int>(i), at.lane, build);
       continue;
     }
     switch (spec.kind) {
@@ -78,50 +79,78 @@ RELIEF_KERNEL bool closure_vector_is_none(const GraphProgramView& program,
          closure_input_is_none(program, spec, offset + 2 * sizeof(float));
 }
 
-/// Whether eight hits can be given a closure's lobes at once: it is a Principled one, of nothing but a base, reflections, sheen and a coat.
-RELIEF_KERNEL bool closure_has_columns(const GraphProgramView& program, const SurfaceClosureSpec& spec)
+/// How many columns of lobes a closure may need that eight hits can be given at once. @return  0: they cannot
+RELIEF_KERNEL int closure_most_columns(const GraphProgramView& program, const SurfaceClosureSpec& spec)
 {
   const auto is_none = [&](std::size_t offset) { return closure_input_is_none(program, spec, offset); };
-  if (spec.kind == ClosureKind::principled3) {
-    using In = Principled3Inputs;
-    return spec.distribution == ClosureDistribution::kGgx && is_none(offsetof(In, subsurface)) &&
-           is_none(offsetof(In, transmission)) && closure_vector_is_none(program, spec, offsetof(In, tangent));
+  const auto vector_is_none = [&](std::size_t offset) { return closure_vector_is_none(program, spec, offset); };
+  const bool is_ggx = spec.distribution == ClosureDistribution::kGgx;
+  const bool scatters_once = is_ggx || spec.distribution == ClosureDistribution::kBeckmann;
+  switch (spec.kind) {
+    case ClosureKind::diffuse:
+      return is_none(offsetof(DiffuseInputs, roughness)) ? 1 : 0;
+    case ClosureKind::translucent:
+      return 1;
+    case ClosureKind::glossy:
+      return scatters_once && vector_is_none(offsetof(GlossyInputs, tangent)) ? 1 : 0;
+    case ClosureKind::refraction:
+      return scatters_once ? 1 : 0;
+    case ClosureKind::glass:
+      return scatters_once && spec.maths < Maths::k43 ? 2 : 0;
+    case ClosureKind::principled3: {
+      using In = Principled3Inputs;
+      const bool has_more = !is_none(offsetof(In, subsurface)) || !is_none(offsetof(In, transmission)) ||
+                            !vector_is_none(offsetof(In, tangent));
+      if (!is_ggx || has_more) return 0;
+      return 2 + (is_none(offsetof(In, sheen)) ? 0 : 1) + (is_none(offsetof(In, clearcoat)) ? 0 : 1);
+    }
+    case ClosureKind::principled4: {
+      using In = Principled4Inputs;
+      const auto is_white = [&](std::size_t offset) {
+        const int first = spec.first_result + 1 + static_cast<int>(offset / sizeof(float));
+        const float* const color = program.result_values + first;
+        return program.varying_before[first] == program.varying_before[first + 3] && color[0] == 1.0f &&
+               color[1] == 1.0f && color[2] == 1.0f;
+      };
+      const bool has_coat = !is_none(offsetof(In, coat_weight));
+      const bool has_more = !is_none(offsetof(In, diffuse_roughness)) || !is_none(offsetof(In, subsurface_weight)) ||
+                            !is_none(offsetof(In, transmission_weight)) ||
+                            !is_none(offsetof(In, thin_film_thickness)) || !vector_is_none(offsetof(In, tangent)) ||
+                            (has_coat && !is_white(offsetof(In, coat_tint)));
+      if (!(is_ggx || spec.distribution == ClosureDistribution::kMultiscatterGgx) || has_more) return 0;
+      const bool is_metal = !is_none(offsetof(In, metallic));
+      return 2 + (is_metal ? 1 : 0) + (is_none(offsetof(In, sheen_weight)) ? 0 : 1) + (has_coat ? 1 : 0);
+    }
+    default:
+      return 0;
   }
-  if (spec.kind != ClosureKind::principled4) return false;
-  using In = Principled4Inputs;
-  const auto is_white = [&](std::size_t offset) {
-    const int first = spec.first_result + 1 + static_cast<int>(offset / sizeof(float));
-    const float* const color = program.result_values + first;
-    return program.varying_before[first] == program.varying_before[first + 3] && color[0] == 1.0f && color[1] == 1.0f &&
-           color[2] == 1.0f;
-  };
-  return (spec.distribution == ClosureDistribution::kGgx ||
-          spec.distribution == ClosureDistribution::kMultiscatterGgx) &&
-         is_none(offsetof(In, diffuse_roughness)) && is_none(offsetof(In, subsurface_weight)) &&
-         is_none(offsetof(In, transmission_weight)) && is_none(offsetof(In, thin_film_thickness)) &&
-         closure_vector_is_none(program, spec, offsetof(In, tangent)) &&
-         (is_none(offsetof(In, coat_weight)) || is_white(offsetof(In, coat_tint)));
 }
 
-/// The first such closure of a program. @return  null: there is none, or the surface's normal is not its hit's
-RELIEF_KERNEL const SurfaceClosureSpec* closures_with_columns(const GraphProgramView& program)
+/// Closures of a program that eight hits can be given at once, as many as there are columns for.
+/// @return  bit by bit; 0: there is none, or the surface's normal is not its hit's
+RELIEF_KERNEL std::uint64_t closures_with_columns(const GraphProgramView& program)
 {
-  if (program.surface_normal != kNoGraphOperand) return nullptr;
-  for (std::uint32_t i = 0; i < program.num_closures; ++i) {
-    if (closure_has_columns(program, program.closures[i])) return &program.closures[i];
+  std::uint64_t found = 0;
+  if (program.surface_normal != kNoGraphOperand) return found;
+  int left = kMostLobeColumns;
+  for (std::uint32_t i = 0; i < program.num_closures && i < 64; ++i) {
+    const int most = closure_most_columns(program, program.closures[i]);
+    if (most == 0 || most > left) continue;
+    found |= std::uint64_t{1} << i;
+    left -= most;
   }
-  return nullptr;
+  return found;
 }
 
 /// Whether nothing else of a program scatters.
-/// @param alone  of closures_with_columns
-RELIEF_KERNEL bool closure_scatters_alone(const GraphProgramView& program, const SurfaceClosureSpec& alone)
+/// @param columns  of closures_with_columns
+RELIEF_KERNEL bool closures_scatter_alone(const GraphProgramView& program, std::uint64_t columns)
 {
   for (std::uint32_t i = 0; i < program.num_closures; ++i) {
-    const SurfaceClosureSpec& spec = program.closures[i];
-    const bool scatters = spec.kind != ClosureKind::emission && spec.kind != ClosureKind::transparent &&
-                          spec.kind != ClosureKind::holdout;
-    if (scatters && &spec != &alone) return false;
+    const ClosureKind kind = program.closures[i].kind;
+    const bool scatters =
+        kind != ClosureKind::emission && kind != ClosureKind::transparent && kind != ClosureKind::holdout;
+    if (scatters && !(i < 64 && (columns >> i & 1u) != 0)) return false;
   }
   return true;
 }
@@ -144,16 +173,15 @@ RELIEF_KERNEL F8 closure_input_lanes(const GraphProgramView& program, const Grap
   return x - x == 0.0f ? clamp(x, -largest, largest) : splat8(0.0f);
 }
 
-/// Resolves a closure of eight hits.
-/// @param spec       of closures_with_columns
-/// @param registers  of the program's run
-[[gnu::noinline]] RELIEF_KERNEL void closures_resolve_columns(const GraphProgramView& program,
-                                                              const SurfaceClosureSpec& spec,
-                                                              const GraphRegisters& registers,
-                                                              const MixtureBuildLanes& b,
-                                                              LobeColumns& columns)
+/// Adds the columns of a closure.
+/// @pre  closure_most_columns
+RELIEF_KERNEL void closure_add_columns(const GraphProgramView& program,
+                                       const SurfaceClosureSpec& spec,
+                                       const GraphRegisters& registers,
+                                       const MixtureBuildLanes& b,
+                                       LobeColumns& columns)
 {
-  const int first = columns.first_result = spec.first_result;
+  const int first = spec.first_result;
   const auto number = [&](std::size_t offset) {
     return closure_input_lanes(program, registers, first + 1 + static_cast<int>(offset / sizeof(float)));
   };
@@ -161,6 +189,29 @@ RELIEF_KERNEL F8 closure_input_lanes(const GraphProgramView& program, const Grap
     return Vec3x8{number(offset), number(offset + sizeof(float)), number(offset + 2 * sizeof(float))};
   };
   const F8 weight = graph_result_lanes(program, registers, first);
+  const auto facets = [&]<typename In>(const In&) {
+    FacetLanes in;
+    in.weight = weight;
+    in.color = vector(offsetof(In, color));
+    in.roughness = number(offsetof(In, roughness));
+    in.normal = vector(offsetof(In, normal));
+    if constexpr (requires { In::ior; }) in.ior = number(offsetof(In, ior));
+    if constexpr (requires { In::anisotropy; }) in.anisotropy = number(offsetof(In, anisotropy));
+    return in;
+  };
+  if (spec.kind == ClosureKind::diffuse) {
+    using In = DiffuseInputs;
+    diffuse_columns_add(b, spec, weight, vector(offsetof(In, color)), vector(offsetof(In, normal)), columns);
+    return;
+  }
+  if (spec.kind == ClosureKind::translucent) {
+    using In = TranslucentInputs;
+    translucent_columns_add(b, spec, weight, vector(offsetof(In, color)), vector(offsetof(In, normal)), columns);
+    return;
+  }
+  if (spec.kind == ClosureKind::glossy) return glossy_columns_add(b, spec, facets(GlossyInputs{}), columns);
+  if (spec.kind == ClosureKind::refraction) return refraction_columns_add(b, spec, facets(RefractionInputs{}), columns);
+  if (spec.kind == ClosureKind::glass) return glass3_columns_add(b, spec, facets(GlassInputs{}), columns);
   if (spec.kind == ClosureKind::principled3) {
     using In = Principled3Inputs;
     Principled3Lanes in;
@@ -215,6 +266,24 @@ RELIEF_KERNEL F8 closure_input_lanes(const GraphProgramView& program, const Grap
     in.coat_ior = number(offsetof(In, coat_ior));
   }
   principled4_columns_make(b, in, columns);
+}
+
+/// Resolves closures of eight hits.
+/// @param closures   of closures_with_columns
+/// @param registers  of the program's run
+[[gnu::noinline]] RELIEF_KERNEL void closures_resolve_columns(const GraphProgramView& program,
+                                                              std::uint64_t closures,
+                                                              const GraphRegisters& registers,
+                                                              const MixtureBuildLanes& b,
+                                                              LobeColumns& columns)
+{
+  lobe_columns_begin(columns);
+  columns.closures = closures;
+  for (std::uint64_t left = closures; left != 0; left &= left - 1) {
+    const int i = __builtin_ctzll(left), before = columns.num_lobes;
+    closure_add_columns(program, program.closures[i], registers, b, columns);
+    for (int lobe = before; lobe < columns.num_lobes; ++lobe) columns.lobes[lobe].closure = i;
+  }
 }
 
 /// What transparent closures alone let through.

@@ -376,7 +376,8 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   side.bent = !(dot(side.Ns, shading_normal_turned(at.hit.Ns, side.Ng)) > kUnbent);
   side.frame = lobes_side(lobes, side.Ns);
   if (build.lobes != nullptr || lane.program->num_closures > 1) {
-    closures_resolve(lane, build, build.reflects && is_zero(build.tangent) ? columns : nullptr);
+    const bool has_all = build.reflects && build.refracts && is_zero(build.tangent);
+    closures_resolve(lane, build, has_all ? columns : nullptr);
   }
   if (blur.alpha > 0.0f) lobes_blur(lobes, blur.alpha, blur.most_sharp);
 
@@ -385,7 +386,7 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   p = {};
   p.emission = build.emission + m.emission * xyz(material_texture_sample<kFeatures>(m.emission_texture, g.textures,
                                                                                     at.hit.uv, at.uv_width));
-  at.transmits = build.transmits;
+  at.transmits = build.transmits || lobes_transmit(lobes);
   at.holdout = clamp(build.holdout, 0.0f, 1.0f);
   const LobesSum sum = lobes_sum(lobes);
   const float scattered = at.holdout + sum.probability;

@@ -55,6 +55,19 @@ RELIEF_KERNEL LobesSum lobes_sum(const HitLane& one)
   return {sum.probability[one.lane], sum.sharp[one.lane], load_lane(sum.weight, one.lane)};
 }
 
+/// Whether some lobe sends light through the surface. Of lists their closures know.
+RELIEF_KERNEL bool lobes_transmit(const MixtureLobes&) { return false; }
+RELIEF_KERNEL bool lobes_transmit(const HitLane& one)
+{
+  const LobeColumns& c = one.hits->lobes;
+  for (int i = 0; i < c.num_lobes; ++i) {
+    if (mixture_traits(c.lobes[i].is.kind).sides != LobeSides::kReflect && c.lobes[i].is_there[one.lane] != 0) {
+      return true;
+    }
+  }
+  return false;
+}
+
 inline constexpr float kLeastLobeShare = 0.125f;
 
 /// Makes the least chance of a lobe an eighth of all: where the camera looks, a faint reflection of something bright is seen.

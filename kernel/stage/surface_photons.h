@@ -65,13 +65,15 @@ RELIEF_KERNEL void shade_surface_photons(const KernelGlobals& g,
   const Vec3f radiance = event.throughput * f * irradiance * by_area;
   const Vec3f light = radiance_clamped(radiance, g.clamp_indirect);
   (*caustic.radiance)[path] = (*caustic.radiance)[path] + light;
-  if (__builtin_expect(state.light_passes != nullptr, 0)) {
-    LightPassState& passes = state.light_passes[path];
-    const bool is_first = path_bounces(state.bounces[path], BounceKind::kAll) == 0;
-    light_passes_add(
-        passes,
-        is_first ? event_shares<kFeatures>(g, event.closure, wi_local, f, wo.z * wi_local.z < 0.0f) : passes.found,
-        true, light);
+  if constexpr (kTellsEvents<Closure>) {
+    if (__builtin_expect(state.light_passes != nullptr, 0)) {
+      LightPassState& passes = state.light_passes[path];
+      const bool is_first = path_bounces(state.bounces[path], BounceKind::kAll) == 0;
+      light_passes_add(
+          passes,
+          is_first ? event_shares<kFeatures>(g, event.closure, wi_local, f, wo.z * wi_local.z < 0.0f) : passes.found,
+          true, light);
+    }
   }
 }
 

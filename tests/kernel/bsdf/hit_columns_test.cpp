@@ -32,6 +32,8 @@ class EightHits : public PrincipledProgram {
   struct Each {
     Vec3f wo, Ng, Ns, to_lamp;
     Vec2f u;
+    float branch = 0.5f;
+    bool is_front = true;
     float blur = 0, passing = 0;
     bool is_first = false;
   };
@@ -57,6 +59,8 @@ class EightHits : public PrincipledProgram {
     hit.Ns = is_smooth ? above(hit.Ng) : hit.Ng;
     hit.to_lamp = anywhere();
     hit.u = {random_.next(), random_.next()};
+    hit.branch = side_random_.next();
+    hit.is_front = side_random_.next() < 0.5f;
     if (random_.next() < 0.05f) hit.u.x = random_.next() < 0.5f ? 0.0f : 1.0f - 1e-5f;
     if (random_.next() < 0.3f) hit.blur = 0.5f * random_.next();
     hit.is_first = random_.next() < 0.5f;
@@ -75,19 +79,20 @@ class EightHits : public PrincipledProgram {
       lane_set(b.Ng, k, each[k].Ng);
       lane_set(b.Ns, k, each[k].Ns);
       blur[k] = each[k].blur;
-      store_lane(hits_.to_lamp, k, each[k].to_lamp);
+      store_lane(hits_.to[0], k, each[k].to_lamp);
       hits_.u[0][k] = each[k].u.x;
       hits_.u[1][k] = each[k].u.y;
+      hits_.u[2][k] = each[k].branch;
     }
-    closures_resolve_columns(view, spec_, registers_, b, hits_.lobes);
-    hit_columns_begin(b, frame_from_normal(shading_normal_towards(b.Ns, b.wo)), blur, hits_);
+    closures_resolve_columns(view, 1, registers_, b, hits_.lobes);
+    hit_columns_begin(b, frame_from_normal(shading_normal_towards(b.Ns, b.wo)), blur, splat8(-1.0f), hits_);
     for (int k = 0; k < 8; ++k) {
       HitLane lane{&hits_, k};
       sums_[k] = lobes_sum(lane);
       if (each[k].is_first) lobes_defend(lane, each[k].passing);
     }
-    hit_columns_light(hits_);
-    hit_columns_sample(hits_);
+    hit_columns_ask<HitTowards::kLamp>(hits_);
+    hit_columns_sample<false>(hits_);
   }
 
   MixtureLobes& make(const GraphProgramView& view, const Each& hit, int lane)
@@ -110,12 +115,48 @@ class EightHits : public PrincipledProgram {
 
   /// How often what was compared.
   struct {
-    int num_lit = 0, num_diffuse = 0, num_mirrored = 0, num_glossy = 0, num_absorbed = 0, num_delta = 0;
+    int num_lit = 0, num_diffuse = 0, num_mirrored = 0, num_glossy = 0, num_absorbed = 0, num_delta = 0,
+        num_through = 0, num_passed = 0;
   } compared;
+  TestRandom side_random_{11};  ///< of what not all tests look at
   HitColumns hits_{};
   LobesSum sums_[8];
   MixtureLobes lobes_;
 };
+
+/// Whether a lobe lets light through.
+bool goes_through(const MixtureLobe& lobe) { return mixture_traits(lobe.kind).sides != LobeSides::kReflect; }
+
+/// As slope_of, of f · cos by microfacets of other kinds than reflection by GGX.
+float facet_slope_of(const MixtureLobe& lobe, Vec3f wi)
+{
+  const bool refracts = goes_through(lobe) && wi.z < 0.0f, is_glass = lobe.kind == MixtureLobeKind::kGlass;
+  const bool is_reflection = lobe.kind == MixtureLobeKind::kBeckmann;
+  const bool is_beckmann =
+      is_reflection || (is_glass ? lobe.shape.glass.is_beckmann : lobe.shape.refraction.is_beckmann);
+  const AnisotropicAlpha alpha = is_reflection ? lobe.shape.beckmann.alpha
+                                 : is_glass
+                                     ? AnisotropicAlpha{lobe.shape.glass.alpha, lobe.shape.glass.alpha}
+                                     : AnisotropicAlpha{lobe.shape.refraction.alpha, lobe.shape.refraction.alpha};
+  const float eta = is_glass ? lobe.fresnel.eta : is_reflection ? 1.0f : lobe.shape.refraction.eta;
+  const Vec3f h = lobe.wo + (refracts ? eta : 1.0f) * wi;
+  // What half vectors are wrong by, relative to their length, and in widths of the lobe.
+  const float rounding = (1.0f + (refracts ? eta : 1.0f)) / length(h);
+  float slope = 1.0f / std::fabs(wi.z) + rounding / min(alpha.x, alpha.y);
+  if (is_beckmann) {
+    const float z = std::fabs(h.z) / length(h), steep = std::hypot(h.x / alpha.x, h.y / alpha.y) / std::fabs(h.z);
+    slope += rounding / z * (1.0f + 2.0f * steep * steep + 2.0f * steep / min(alpha.x, alpha.y));
+  }
+  const float cos_o = std::fabs(dot(lobe.wo, h)) / length(h), cos_i = std::fabs(dot(wi, h)) / length(h);
+  if (refracts) slope += rounding * (1.0f / cos_o + 1.0f / cos_i);
+  if (is_glass || lobe.fresnel.kind == MixtureFresnel::kInterpolated) {
+    const float cos_d = refracts ? cos_o : half_angle_cosine(lobe.wo, wi);
+    const float index = lobe.fresnel.eta, root = std::sqrt(std::fabs(sqr(index) - 1.0f + sqr(cos_d)));
+    slope += (refracts ? rounding / min(root, cos_d) : 1.0f / std::fabs(cos_d - root)) / root;
+    if (index < 1.0f) slope += 1.0f / (index * root);
+  }
+  return slope;
+}
 
 /// How far f · cos of a lobe changes, relative, if a direction changes by one: most of all at the horizon.
 /// @param wi  the lobe's frame
@@ -132,6 +173,7 @@ float slope_of(const MixtureLobe& lobe, Vec3f wi)
     return horizon + (1.0f + std::fabs(fibres.A) + std::fabs(fibres.B)) / stretched;
   }
   if (mixture_lobe_is_diffuse(lobe)) return horizon;
+  if (goes_through(lobe) || lobe.kind == MixtureLobeKind::kBeckmann) return facet_slope_of(lobe, wi);
   // The slope of a half vector has the rounding of directions over its length, and is asked for in widths of the lobe.
   const bool is_ggx = lobe.kind == MixtureLobeKind::kGgx;
   const float width = is_ggx ? min(lobe.shape.ggx.alpha.x, lobe.shape.ggx.alpha.y) : lobe.shape.clearcoat.alpha;
@@ -153,12 +195,14 @@ Tolerance tolerance_of(const MixtureLobes& lobes, Vec3f wi)
   float slope = 0.0f;
   for (int i = 0; i < lobes.size; ++i) {
     const MixtureLobe& lobe = lobes.lobes[i];
+    if (lobe.is_delta) continue;
     const Vec3f wi_lobe = to_local(lobe.frame, wi);
     slope = max(slope, slope_of(lobe, wi_lobe));
     if (mixture_lobe_is_diffuse(lobe)) continue;
     // A reflectance near none is a difference, too, which the height of the lobe multiplies.
     constexpr float kLastDigits = 2e-7f;
-    const BsdfEval e = mixture_lobe_eval<TransportMode::kRadiance>(lobe, closure_tables(), wi_lobe, false, false);
+    const BsdfEval e = mixture_lobe_eval<TransportMode::kRadiance>(lobe, closure_tables(), wi_lobe,
+                                                                   goes_through(lobe) && wi_lobe.z < 0.0f, false);
     tolerance.absolute += kLastDigits * max_component(lobe.weight) * e.pdf;
   }
   tolerance.relative = 1e-4f + kRounding * slope;
@@ -186,12 +230,12 @@ const MixtureLobe& chosen_of(const MixtureLobes& lobes, float scale, float& u)
 
 /// How far the direction changes that a lobe samples, if its numbers do in their last digits. What is left of one that has chosen the lobe
 /// has as many as the lobe is likely.
-float rounding_of(const MixtureLobe& lobe, float probability, Vec2f u)
+float rounding_of(const MixtureLobe& lobe, float probability, float branch, Vec2f u)
 {
   constexpr float kLastDigits = 3e-7f;
   const auto sampled = [&](float x, float y) {
     return mixture_lobe_sample<TransportMode::kRadiance>(
-               lobe, 0.5f, {clamp(x, 0.0f, 1.0f - kUnitRoundoff), clamp(y, 0.0f, 1.0f - kUnitRoundoff)})
+               lobe, branch, {clamp(x, 0.0f, 1.0f - kUnitRoundoff), clamp(y, 0.0f, 1.0f - kUnitRoundoff)})
         .wi;
   };
   const Vec3f wi = sampled(u.x, u.y);
@@ -225,7 +269,7 @@ void EightHits::compare(const Each& hit, int k, const MixtureLobes& lobes)
   compared.num_lit += e.pdf > 0.0f ? 1 : 0;
 
   const BsdfSample s =
-      closure_sample<kFeatures>(mixture_of(lobes, side, hit.Ng, lane.gain), closure_tables(), 0.5f, hit.u);
+      closure_sample<kFeatures>(mixture_of(lobes, side, hit.Ng, lane.gain), closure_tables(), hit.branch, hit.u);
   const BsdfSample sampled = closure_sample(lane);
   EXPECT_EQ(sampled.pdf > 0.0f, s.pdf > 0.0f);
   if (!(s.pdf > 0.0f)) {
@@ -236,16 +280,18 @@ void EightHits::compare(const Each& hit, int k, const MixtureLobes& lobes)
   const bool is_diffuse = (s.lobe & kLobeDiffuse) != 0, is_delta = (s.lobe & kLobeDelta) != 0;
   Vec2f u = hit.u;
   const MixtureLobe& chosen = chosen_of(lobes, all.scale, u.x);
-  EXPECT_LE(length(sampled.wi - s.wi), 5e-6f + 2.0f * rounding_of(chosen, chosen.probability * all.scale, u));
+  EXPECT_LE(length(sampled.wi - s.wi),
+            5e-6f + 2.0f * rounding_of(chosen, chosen.probability * all.scale, hit.branch, u));
   const float cos_i = std::fabs(sampled.wi.z);
   const Tolerance tolerance = tolerance_of(lobes, from_local(side, sampled.wi));
-  const BsdfEval there = is_delta
-                             ? BsdfEval{s.f, s.pdf}
-                             : mixture_eval<TransportMode::kRadiance>(mixture_of(lobes, side, hit.Ng, lane.gain),
-                                                                      closure_tables(), sampled.wi, &chosen, false);
+  const BsdfEval there =
+      is_delta ? BsdfEval{s.f, s.pdf}
+               : mixture_eval<TransportMode::kRadiance>(mixture_of(lobes, side, hit.Ng, lane.gain), closure_tables(),
+                                                        sampled.wi, &chosen, (s.lobe & kLobeTransmit) != 0);
   expect_close(sampled.f * cos_i, there.f * cos_i, "sampled f", tolerance);
   expect_close(sampled.pdf, there.pdf, "sampled pdf", tolerance);
   expect_close(sampled.roughness, s.roughness, "width");
+  if ((s.lobe & kLobeTransmit) != 0) ++(is_delta ? compared.num_passed : compared.num_through);
   ++(is_diffuse ? compared.num_diffuse : is_delta ? compared.num_mirrored : compared.num_glossy);
 }
 
@@ -340,38 +386,142 @@ class ListedHits : public EightHits {
     if (i % 4 != 0) closure_add(build, spec, 0.4f, glossy);
     if (i % 4 == 0) closure_add(build, spec, 0.4f, coated);
   }
+
+  /// Compares groups of eight, whose lists a function makes.
+  /// @return  how many there were
+  template <typename Add>
+  int compare_groups(int groups, Add&& add_to)
+  {
+    const std::unique_ptr<MixtureLobes[]> lists(new MixtureLobes[8]);
+    int num_groups = 0;
+    for (int i = 0; i < groups && !HasFailure(); ++i) {
+      SCOPED_TRACE(i);
+      Each each[8];
+      for (int k = 0; k < 8; ++k) {
+        Each& hit = each[k] = thrown_hit(i % 4 != 0);
+        MixtureLobes& lobes = lists[static_cast<std::size_t>(k)];
+        lobes.size = 0;
+        MixtureBuild build{hit.wo, hit.Ng, hit.Ns, hit.is_front, &closure_tables(), &lobes};
+        build.blur = hit.blur;
+        add_to(i, hit, build);
+        if (hit.blur > 0.0f) lobes_blur(lobes, hit.blur, -1.0f);
+        if (hit.is_first) lobes_defend(lobes, hit.passing);
+        hit_columns_set_surface(hits_, k, hit.Ng, frame_from_normal(shading_normal_towards(hit.Ns, hit.wo)));
+        store_lane(hits_.to[0], k, hit.to_lamp);
+        hits_.u[0][k] = hit.u.x;
+        hits_.u[1][k] = hit.u.y;
+        hits_.u[2][k] = hit.branch;
+      }
+      if (!lobe_columns_take(hits_.lobes, lists.get(), 8)) continue;
+      ++num_groups;
+      hit_columns_ask<HitTowards::kLamp>(hits_);
+      hit_columns_sample<false>(hits_);
+      for (int k = 0; k < 8; ++k) compare(each[k], k, lists[static_cast<std::size_t>(k)]);
+    }
+    return num_groups;
+  }
 };
 
 TEST_F(ListedHits, ScatterAsTheirLists)
 {
-  const std::unique_ptr<MixtureLobes[]> lists(new MixtureLobes[8]);
-  int num_groups = 0;
-  for (int i = 0; i < 12000 && !HasFailure(); ++i) {
-    Each each[8];
-    for (int k = 0; k < 8; ++k) {
-      Each& hit = each[k] = thrown_hit(i % 4 != 0);
-      MixtureLobes& lobes = lists[static_cast<std::size_t>(k)];
-      lobes.size = 0;
-      MixtureBuild build{hit.wo, hit.Ng, hit.Ns, true, &closure_tables(), &lobes};
-      add(i, hit, build);
-      if (hit.blur > 0.0f) lobes_blur(lobes, hit.blur, -1.0f);
-      if (hit.is_first) lobes_defend(lobes, hit.passing);
-      hit_columns_set_surface(hits_, k, hit.Ng, frame_from_normal(shading_normal_towards(hit.Ns, hit.wo)));
-      store_lane(hits_.to_lamp, k, hit.to_lamp);
-      hits_.u[0][k] = hit.u.x;
-      hits_.u[1][k] = hit.u.y;
-    }
-    if (!lobe_columns_take(hits_.lobes, lists.get(), 8)) continue;
-    ++num_groups;
-    hit_columns_light(hits_);
-    hit_columns_sample(hits_);
-    for (int k = 0; k < 8; ++k) compare(each[k], k, lists[static_cast<std::size_t>(k)]);
-  }
+  const int num_groups =
+      compare_groups(12000, [&](int i, const Each& hit, MixtureBuild& build) { add(i, hit, build); });
   EXPECT_GT(num_groups, 11000);
   EXPECT_GT(compared.num_lit, 30000);
   EXPECT_GT(compared.num_diffuse, 15000);
   EXPECT_GT(compared.num_mirrored, 150);
   EXPECT_GT(compared.num_glossy, 15000);
+}
+
+/// Light goes through some of their lobes.
+class HitsThrough : public ListedHits {
+ protected:
+  /// Adds one hit's closures to a list.
+  /// @param i  of the group
+  void add_through(int i, const Each& hit, MixtureBuild& build)
+  {
+    const Vec3f color{random_.next(), random_.next(), random_.next()};
+    const Vec3f normal = i % 7 == 0 ? Vec3f{hit.Ns.x, -hit.Ns.z, hit.Ns.y} + 0.3f * color : Vec3f{};
+    SurfaceClosureSpec spec;
+    spec.maths = build.maths = i % 3 == 0 ? Maths::k34 : i % 3 == 1 ? Maths::k43 : Maths::k52;
+    constexpr ClosureDistribution kDistributions[] = {ClosureDistribution::kGgx, ClosureDistribution::kBeckmann,
+                                                      ClosureDistribution::kMultiscatterGgx,
+                                                      ClosureDistribution::kSharp};
+    const int kind = i / 3 % 6;
+    const ClosureDistribution distribution = kDistributions[i / 18 % 4];
+    if (kind != 0 && kind != 4) spec.distribution = distribution;
+    const float roughness = random_.next() < 0.1f ? 0.0f : random_.next();
+    // Both sides, and now and then none: indices that match.
+    const float ior = random_.next() < 0.05f ? 1.0f : 1.05f + random_.next();
+    const auto translucent = [&](float weight) {
+      TranslucentInputs in;
+      in.color = color;
+      in.normal = normal;
+      closure_add(build, spec, weight, in);
+    };
+    if (kind == 0) {
+      DiffuseInputs in;
+      in.color = color;
+      closure_add(build, spec, 0.6f, in);
+      translucent(0.4f);
+    } else if (kind == 1) {
+      RefractionInputs in;
+      in.color = color;
+      in.normal = normal;
+      in.roughness = roughness;
+      in.ior = ior;
+      closure_add(build, spec, 0.7f, in);
+      if (random_.next() < 0.5f) translucent(0.3f);
+    } else if (kind == 2) {
+      GlassInputs in;
+      in.color = color;
+      in.normal = normal;
+      in.roughness = roughness;
+      in.ior = ior;
+      closure_add(build, spec, 0.8f, in);
+    } else if (kind == 3) {
+      GlossyInputs in;
+      in.color = color;
+      in.normal = normal;
+      in.roughness = roughness;
+      in.anisotropy = random_.next() - 0.5f;
+      closure_add(build, spec, 0.5f, in);
+      if (random_.next() < 0.7f) translucent(0.5f);
+    } else if (kind == 4) {
+      Principled3Inputs in;
+      in.base_color = color;
+      in.normal = normal;
+      in.roughness = roughness;
+      in.transmission = random_.next() < 0.5f ? 1.0f : random_.next();
+      in.ior = ior;
+      closure_add(build, spec, 0.9f, in);
+    } else {
+      if (distribution != ClosureDistribution::kMultiscatterGgx) spec.distribution = ClosureDistribution::kGgx;
+      if (spec.maths == Maths::k34) spec.maths = build.maths = Maths::k52;
+      Principled4Inputs in;
+      in.base_color = color;
+      in.normal = normal;
+      in.roughness = roughness;
+      in.transmission_weight = random_.next() < 0.5f ? 1.0f : random_.next();
+      in.ior = ior;
+      if (random_.next() < 0.5f) in.specular_tint = {random_.next(), 1, 1};
+      closure_add(build, spec, 0.9f, in);
+    }
+  }
+};
+
+TEST_F(HitsThrough, ScatterAsTheirLists)
+{
+  const int num_groups =
+      compare_groups(24000, [&](int i, const Each& hit, MixtureBuild& build) { add_through(i, hit, build); });
+  // Those of Ashikhmin and Shirley and what facets scatter twice up to 3.6 are no columns.
+  EXPECT_GT(num_groups, 19000);
+  EXPECT_GT(compared.num_lit, 60000);
+  EXPECT_GT(compared.num_diffuse, 20000);
+  EXPECT_GT(compared.num_mirrored, 5000);
+  EXPECT_GT(compared.num_glossy, 30000);
+  EXPECT_GT(compared.num_through, 30000);
+  EXPECT_GT(compared.num_passed, 5000);
 }
 
 TEST_F(ListedHits, OfOtherLobesAreNotTaken)
@@ -387,7 +537,7 @@ TEST_F(ListedHits, OfOtherLobesAreNotTaken)
   for (int k = 0; k < 8; ++k) fill(k, diffuse);
   EXPECT_TRUE(lobe_columns_take(hits_.lobes, lists.get(), 8));
   EXPECT_EQ(hits_.lobes.num_lobes, 1);
-  fill(5, [](MixtureBuild& b) { closure_add(b, {}, 1.0f, TranslucentInputs{}); });
+  fill(5, [](MixtureBuild& b) { closure_add(b, {}, 1.0f, VelvetInputs{}); });
   EXPECT_FALSE(lobe_columns_take(hits_.lobes, lists.get(), 8));
   EXPECT_TRUE(lobe_columns_take(hits_.lobes, lists.get(), 5));
   fill(5, [&](MixtureBuild& b) {

@@ -70,6 +70,16 @@ class PrincipledProgram : public testing::Test {
     }
   }
 
+  /// Makes the closure another one.
+  template <typename Inputs>
+  void use(const SurfaceClosureSpec& spec, const Inputs& inputs)
+  {
+    spec_ = spec;
+    std::memset(constants_, 0, sizeof constants_);
+    constants_[0] = 1.0f;
+    set(inputs);
+  }
+
   static int result_of(std::size_t offset) { return 1 + static_cast<int>(offset / sizeof(float)); }
 
   void vary(int result) { results_[static_cast<std::size_t>(result)] = static_cast<std::uint16_t>(result); }
