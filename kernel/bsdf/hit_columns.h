@@ -242,8 +242,10 @@ template <bool kSplits>
       other = other + part;
     }
     if constexpr (kSplits) {
+      // What is sharp of a sampled direction is asked as if it had not been sampled: photons would not be.
       const I8 is_sharp = (load8(lobe.roughness) <= load8(h.most_sharp)) & (load8(lobe.roughness) < kInfinity);
-      sharp = select(is_sharp, sharp + part, sharp);
+      const I8 is_asked = is_sharp & lobe_column_reach(lobe.is, at, I8{}).asks;
+      sharp = select(is_asked, sharp + part, sharp);
       soft = select(is_sharp, soft, soft + part);
     }
     found += is_there & reach.finds ? probability * pdf : none;

@@ -34,6 +34,8 @@ class EightHits : public PrincipledProgram {
     Vec2f u;
     float branch = 0.5f;
     bool is_front = true;
+    Vec3f to_photon;
+    float most_sharp = -1;  ///< up to which roughness lobes are sharp
     float blur = 0, passing = 0;
     bool is_first = false;
   };
@@ -61,6 +63,9 @@ class EightHits : public PrincipledProgram {
     hit.u = {random_.next(), random_.next()};
     hit.branch = side_random_.next();
     hit.is_front = side_random_.next() < 0.5f;
+    const auto centred = [&] { return side_random_.next() - 0.5f; };
+    hit.to_photon = normalize(Vec3f{centred(), centred(), centred()});
+    hit.most_sharp = side_random_.next() < 0.3f ? kInfinity : side_random_.next();
     if (random_.next() < 0.05f) hit.u.x = random_.next() < 0.5f ? 0.0f : 1.0f - 1e-5f;
     if (random_.next() < 0.3f) hit.blur = 0.5f * random_.next();
     hit.is_first = random_.next() < 0.5f;
@@ -113,10 +118,13 @@ class EightHits : public PrincipledProgram {
   /// Compares columns with a hit's list.
   void compare(const Each& hit, int k, const MixtureLobes& lobes);
 
+  /// Compares the sharp part of columns, and the soft one, with those of a hit's list.
+  void compare_parts(const Each& hit, int k, const MixtureLobes& lobes);
+
   /// How often what was compared.
   struct {
     int num_lit = 0, num_diffuse = 0, num_mirrored = 0, num_glossy = 0, num_absorbed = 0, num_delta = 0,
-        num_through = 0, num_passed = 0;
+        num_through = 0, num_passed = 0, num_sharp = 0, num_soft = 0;
   } compared;
   TestRandom side_random_{11};  ///< of what not all tests look at
   HitColumns hits_{};
@@ -295,6 +303,40 @@ void EightHits::compare(const Each& hit, int k, const MixtureLobes& lobes)
   ++(is_diffuse ? compared.num_diffuse : is_delta ? compared.num_mirrored : compared.num_glossy);
 }
 
+void EightHits::compare_parts(const Each& hit, int k, const MixtureLobes& lobes)
+{
+  const SharpLobes sharp{true, true, hit.most_sharp};
+  const HitLane lane{&hits_, k, 1.25f, HitTowards::kPhoton};
+  const Frame side = frame_from_normal(shading_normal_towards(hit.Ns, hit.wo));
+  const Mixture all = mixture_of(lobes, side, hit.Ng, lane.gain);
+  EXPECT_EQ(closure_has<true>(lane, sharp), closure_has<true>(all, sharp));
+  EXPECT_EQ(closure_has<false>(lane, sharp), closure_has<false>(all, sharp));
+
+  const auto f_of = [](const auto& closure, Vec3f wi) {
+    return closure_eval<kFeatures>(closure, closure_tables(), wi).f * std::fabs(wi.z);
+  };
+  const Tolerance tolerance = tolerance_of(lobes, hit.to_photon);
+  const Vec3f photon = to_local(side, hit.to_photon);
+  expect_close(f_of(lane, photon), f_of(all, photon), "towards photons", tolerance);
+  const Vec3f soft = f_of(closure_soft(all, sharp), photon);
+  expect_close(f_of(closure_soft(lane, sharp), photon), soft, "soft", tolerance);
+  expect_close(f_of(closure_soft(lane, kAllSharp), photon), f_of(closure_soft(all, kAllSharp), photon), "matte",
+               tolerance);
+  compared.num_soft += is_zero(soft) ? 0 : 1;
+
+  const BsdfSample sampled = closure_sample(lane);
+  // Where glass has mirrored to below its own normal lists ask what it refracts there.
+  const Vec3f wi = from_local(side, sampled.wi);
+  bool goes_below = false;
+  for (int i = 0; i < lobes.size; ++i) {
+    goes_below = goes_below || (dot(wi, lobes.lobes[i].frame.n) < 0.0f) != ((sampled.lobe & kLobeTransmit) != 0);
+  }
+  if (!(sampled.pdf > 0.0f) || (sampled.lobe & kLobeDelta) != 0 || goes_below) return;
+  const Vec3f f_sharp = f_of(closure_sharp(all, sharp), sampled.wi);
+  expect_close(f_of(closure_sharp(lane, sharp), sampled.wi), f_sharp, "sharp", tolerance_of(lobes, wi));
+  compared.num_sharp += is_zero(f_sharp) ? 0 : 1;
+}
+
 TEST_F(EightHits, ScatterAsEachByItself)
 {
   for (const PrincipledCase& one : kPrincipledCases) {
@@ -411,12 +453,18 @@ class ListedHits : public EightHits {
         hits_.u[0][k] = hit.u.x;
         hits_.u[1][k] = hit.u.y;
         hits_.u[2][k] = hit.branch;
+        store_lane(hits_.to[1], k, hit.to_photon);
+        hits_.most_sharp[k] = hit.most_sharp;
       }
       if (!lobe_columns_take(hits_.lobes, lists.get(), 8)) continue;
       ++num_groups;
       hit_columns_ask<HitTowards::kLamp>(hits_);
-      hit_columns_sample<false>(hits_);
-      for (int k = 0; k < 8; ++k) compare(each[k], k, lists[static_cast<std::size_t>(k)]);
+      hit_columns_ask<HitTowards::kPhoton>(hits_);
+      hit_columns_sample<true>(hits_);
+      for (int k = 0; k < 8; ++k) {
+        compare(each[k], k, lists[static_cast<std::size_t>(k)]);
+        compare_parts(each[k], k, lists[static_cast<std::size_t>(k)]);
+      }
     }
     return num_groups;
   }
@@ -522,6 +570,8 @@ TEST_F(HitsThrough, ScatterAsTheirLists)
   EXPECT_GT(compared.num_glossy, 30000);
   EXPECT_GT(compared.num_through, 30000);
   EXPECT_GT(compared.num_passed, 5000);
+  EXPECT_GT(compared.num_sharp, 20000);
+  EXPECT_GT(compared.num_soft, 20000);
 }
 
 TEST_F(ListedHits, OfOtherLobesAreNotTaken)
