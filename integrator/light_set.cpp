@@ -94,6 +94,22 @@ LightSet light_set_make(const Scene& scene,
     set.environment_irradiance = environment_irradiance(set.environment, set.channels);
   }
   light_tree_build(set);
+  // What some rays pass and others not makes light that is asked for another than light that is found. Cycles finds it.
+  const bool rays_differ =
+      std::any_of(scene.instances.begin(), scene.instances.end(),
+                  [](const Instance& instance) {
+                    return (instance.flags & kHiddenFrom) != 0 || (instance.flags & kCastsShadow) == 0;
+                  }) ||
+      std::any_of(scene.materials.begin(), scene.materials.end(),
+                  [](const Material& material) { return material.depends_on_ray && material.transparency_index >= 0; });
+  // Meshes that shine and are asked for by nobody are for paths to find.
+  const auto is_found_alone = [&](std::size_t i) {
+    const auto material = static_cast<std::size_t>(scene.instances[i].material_index);
+    return set.first_light_index[i] < 0 && !is_zero(scene.materials[material].emission);
+  };
+  bool any_found_alone = false;
+  for (std::size_t i = 0; i < scene.instances.size(); ++i) any_found_alone |= is_found_alone(i);
+  if (!rays_differ && !any_found_alone) set.sky_in_media = set.environment_irradiance.mean;
   if (!set.environment.environment.has_map && density == EnvironmentDensity::kExcess) {
     // Where the other lights are weaker than this, leaving the environment to the BSDF costs more variance than it saves:
     // measured under suns of 1.7 to .05 of the environment's irradiance, the two are even at about .15.
@@ -102,15 +118,6 @@ LightSet light_set_make(const Scene& scene,
     float suns = 0;
     for (const std::uint32_t sun : set.suns) suns += light_scalar(set.lights[sun].emission, set.channels);
     // Decided for the whole scene, so that sides turned away from the sun save their shadow rays.
-    // What some rays pass and others not makes light that is asked for another than light that is found. Cycles finds it.
-    const bool rays_differ =
-        std::any_of(scene.instances.begin(), scene.instances.end(),
-                    [](const Instance& instance) {
-                      return (instance.flags & kHiddenFrom) != 0 || (instance.flags & kCastsShadow) == 0;
-                    }) ||
-        std::any_of(scene.materials.begin(), scene.materials.end(), [](const Material& material) {
-          return material.depends_on_ray && material.transparency_index >= 0;
-        });
     if (suns > set.environment_yields_to || rays_differ) set.environment_irradiance = {};
   }
   return set;
@@ -146,6 +153,7 @@ LightsView LightSet::view() const
   v.environment = environment.view();
   v.environment_irradiance = environment_irradiance;
   v.environment_yields_to = environment_yields_to;
+  v.sky_in_media = sky_in_media;
   v.environment_casts_caustics = environment_casts_caustics;
   v.motions = motions;
   return v;

@@ -42,6 +42,7 @@ struct LightSet {
   EnvironmentTables environment;
   EnvironmentIrradiance environment_irradiance;  ///< of what next-event estimation samples of it
   float environment_yields_to = kInfinity;       ///< see LightsView
+  float sky_in_media = 0;                        ///< likewise
   double environment_flux_density = 0;           ///< π × mean radiance of all of it, W/m²
   Vec3f environment_color;                       ///< of that: mean radiance
   double environment_solid_angle = 0;      ///< (∫L)² / ∫L²: how wide an even light of its contrast would be, sr

@@ -180,6 +180,11 @@ SceneContext::SceneContext(const Scene& loaded,
   globals.num_area_lights = static_cast<std::uint32_t>(lights.area_lights.size());
   globals.lights = lights.view();
   globals.has_lights = lights.any();
+  // What shines in space is found by paths alone.
+  const bool media_shine =
+      std::any_of(media.begin(), media.end(), [](const Medium& medium) { return !is_zero(medium.emission); }) ||
+      varying_media.shines();
+  if (media_shine) globals.lights.sky_in_media = 0.0f;
   if (globals.world_medium >= 0) leave_out_what_is_far(media.back(), globals);
   globals.bsdf_tables = bsdf_tables.get();
   globals.environment_visible_to_camera = scene.environment.visible_to_camera;

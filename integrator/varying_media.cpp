@@ -315,9 +315,6 @@ void VaryingMedia::make(const SceneContext& context)
     medium.program = volume.program.view();
     medium.closures = volume.closures.data();
     medium.num_closures = static_cast<std::uint32_t>(volume.closures.size());
-    medium.shines = std::any_of(volume.closures.begin(), volume.closures.end(), [](const VolumeClosureSpec& closure) {
-      return volume_closure_visit(closure.kind, [](auto kind) { return kind.kShines; });
-    });
     media_.push_back(medium);
   };
   for (const VolumeProgram& volume : scene.varying_media) add(volume);
@@ -329,7 +326,7 @@ void VaryingMedia::make(const SceneContext& context)
       media_.emplace_back();
   }
   place_of_instance_.assign(scene.instances.size(), -1);
-  const auto medium_of = [&](std::size_t instance) -> const VaryingMedium* {
+  const auto medium_of = [&](std::size_t instance) -> VaryingMedium* {
     const auto material = static_cast<std::size_t>(scene.instances[instance].material_index);
     const int medium = scene.materials[material].medium_index;
     if (medium < 0 || media_[static_cast<std::size_t>(medium)].num_closures == 0) return nullptr;
@@ -349,6 +346,7 @@ void VaryingMedia::make(const SceneContext& context)
   if (world != nullptr) {
     media_.back().place_of_instance = nullptr;
     const Problem problem = add_rates(context, media_.back(), kWholeWorld);
+    media_.back().shines = problem.shines;
     if (!problem.has_bounds) {
       problems_.emplace_back(
           "what fills the world has no bounds on its density: twice the most that was found at 16 points a side stands "
@@ -357,9 +355,10 @@ void VaryingMedia::make(const SceneContext& context)
     }
   }
   for (std::size_t i = 0; i < scene.instances.size(); ++i) {
-    const VaryingMedium* medium = medium_of(i);
+    VaryingMedium* medium = medium_of(i);
     if (medium == nullptr) continue;
     const Problem problem = add_rates(context, *medium, static_cast<std::int32_t>(i));
+    medium->shines |= problem.shines;
     const std::string who = "the volume in \"" + scene.instances[i].name + '"';
     constexpr std::size_t kMostNamed = 10;
     if (!problem.has_bounds && problems_.size() < kMostNamed) {
@@ -478,6 +477,7 @@ VaryingMedia::Problem VaryingMedia::make_rates(const RatesOf& of,
       if (rate * diagonal * scale > kNothing) known = box_of(found[i], rate, corner_to_corner);
       // What only shines has to be met as well.
       if (rates[i].emits) known.shows += 1.0f / (diagonal * scale);
+      problem.shines |= rates[i].emits;
     }
   }
   grid.boxes = all.data();

@@ -2,6 +2,7 @@
 // be at some points, and what the bounds of its value graph (kernel/graph/graph_bounds.h) say that it may be.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -22,12 +23,19 @@ class VaryingMedia {
   /// By Material::medium_index and, last, what fills the world; null: none varies.
   const VaryingMedium* view() const { return media_.empty() ? nullptr : media_.data(); }
 
+  /// Whether one of them may send out light.
+  bool shines() const
+  {
+    return std::any_of(media_.begin(), media_.end(), [](const VaryingMedium& medium) { return medium.shines; });
+  }
+
   /// Media without useful bounds, a line each.
   const std::vector<std::string>& problems() const { return problems_; }
 
  private:
   struct Problem {
     bool has_bounds = true, is_tamed = false;  ///< the latter is not told of the world, whose fog often grows downwards
+    bool shines = false;                       ///< it may send out light somewhere
   };
   /// Whose boxes, and how many: see RateGrid.
   struct RatesOf {

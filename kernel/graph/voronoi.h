@@ -17,6 +17,7 @@ enum VoronoiFlags : std::uint16_t {
   kVoronoiFar = 1u << 0,        ///< cells count however far they are (4.0 on), not to a distance of 8
   kVoronoiPcg = 1u << 1,        ///< the cells of 5.0 on
   kVoronoiNormalize = 1u << 2,  ///< distances and colours in 0…1
+  kVoronoiBare = 1u << 3,       ///< nobody asks for colours and positions; set by the compiler of graphs
 };
 
 /// @tparam kPcg  the cells of 5.0 on; a parameter, as a choice in the innermost loop costs a third more
@@ -154,11 +155,13 @@ template <int kDims, bool kPcg>
 
 /// Calls visit(offset, point) for all cells up to `reach` away: the offset of a cell and its point from the corner of the
 /// middle one. The first axis moves fastest.
-template <int kDims, bool kPcg, typename F>
+/// @param is_left_out  (offset) -> whether a cell is
+template <int kDims, bool kPcg, typename F, typename IsLeftOut>
 [[gnu::always_inline]] RELIEF_KERNEL void voronoi_cells(const F8 (&cell)[kDims],
                                                         const VoronoiSettings<kDims, kPcg>& settings,
                                                         int reach,
-                                                        F&& visit)
+                                                        F&& visit,
+                                                        const IsLeftOut& is_left_out)
 {
   const int side = 2 * reach + 1;
   int count = 1;
@@ -169,10 +172,20 @@ template <int kDims, bool kPcg, typename F>
       offset[i] = splat8(static_cast<float>(rest % side - reach));
       corner[i] = cell[i] + offset[i];
     }
+    if (is_left_out(offset)) continue;
     voronoi_point<kDims, kPcg>(corner, point);
     for (int i = 0; i < kDims; ++i) point[i] = offset[i] + point[i] * settings.randomness;
     visit(offset, point);
   }
+}
+
+template <int kDims, bool kPcg, typename F>
+[[gnu::always_inline]] RELIEF_KERNEL void voronoi_cells(const F8 (&cell)[kDims],
+                                                        const VoronoiSettings<kDims, kPcg>& settings,
+                                                        int reach,
+                                                        F&& visit)
+{
+  voronoi_cells<kDims>(cell, settings, reach, visit, [](const F8(&)[kDims]) { return false; });
 }
 
 template <int kDims>
@@ -216,6 +229,23 @@ RELIEF_KERNEL Voronoi<kDims> voronoi_nearest(const F8 (&cell)[kDims],
   return out;
 }
 
+/// Whether a cell's point is too far at all eight points to change a distance that smoothing reaches so far.
+/// @param gaps  along each axis, of the offsets from −2 on: how far the cell is away at least
+/// @param far   no distance of a point beyond counts
+template <int kDims, bool kPcg>
+RELIEF_KERNEL bool voronoi_is_far(const F8 (&gaps)[kDims][5],
+                                  const F8 (&offset)[kDims],
+                                  F8 far,
+                                  const VoronoiSettings<kDims, kPcg>& settings)
+{
+  if (settings.metric == VoronoiMetric::kMinkowski) return false;  // as slow as to find the point
+  F8 gap[kDims], none[kDims]{};
+  for (int i = 0; i < kDims; ++i) gap[i] = gaps[i][static_cast<int>(offset[i][0]) + 2];
+  // Less than what rounding changes of numbers up to 8.
+  constexpr float kRounding = 1e-5f;
+  return mask_of(voronoi_distance<kDims>(gap, none, settings) > far + kRounding) == 0xffu;
+}
+
 /// All points near, the nearer the more.
 template <int kDims, bool kPcg>
 RELIEF_KERNEL Voronoi<kDims> voronoi_smooth(const F8 (&cell)[kDims],
@@ -228,20 +258,36 @@ RELIEF_KERNEL Voronoi<kDims> voronoi_smooth(const F8 (&cell)[kDims],
   F8 least = splat8(counts_first ? 1.0f : 0.0f);
   out.distance = splat8(counts_first ? 0.0f : 8.0f);
   const F8 smoothness = settings.smoothness;
-  voronoi_cells<kDims>(cell, settings, 2, [&](const F8(&offset)[kDims], const F8(&point)[kDims]) {
+  const bool is_bare = (settings.flags & kVoronoiBare) != 0;
+  F8 gaps[kDims][5];
+  for (int i = 0; i < kDims; ++i) {
+    for (int n = 0; n < 5; ++n) {
+      const F8 low = splat8(static_cast<float>(n - 2));
+      gaps[i][n] = max(max(low - local[i], local[i] - (low + settings.randomness)), F8{});
+    }
+  }
+  // What is farther has no share at all, not even of a rounding. The first may count whole.
+  bool is_first = counts_first;
+  const auto is_far = [&](const F8(&offset)[kDims]) {
+    return !is_first && voronoi_is_far<kDims>(gaps, offset, out.distance + smoothness, settings);
+  };
+  const auto blend = [&](const F8(&offset)[kDims], const F8(&point)[kDims]) {
+    is_first = false;
     const F8 distance = voronoi_distance<kDims>(point, local, settings);
     const F8 t = max(clamp(0.5f + 0.5f * (out.distance - distance) / smoothness, 0.0f, 1.0f), least);
     const F8 h = t * t * (3.0f - 2.0f * t);
     least = F8{};
     F8 correction = smoothness * h * (1.0f - h);
     out.distance = (out.distance + h * (distance - out.distance)) - correction;
+    if (is_bare) return;
     correction /= 1.0f + 3.0f * smoothness;
     F8 corner[kDims], color[3];
     for (int i = 0; i < kDims; ++i) corner[i] = cell[i] + offset[i];
     voronoi_color<kDims, kPcg>(corner, color);
     for (int i = 0; i < 3; ++i) out.color[i] = (out.color[i] + h * (color[i] - out.color[i])) - correction;
     for (int i = 0; i < kDims; ++i) out.position[i] = (out.position[i] + h * (point[i] - out.position[i])) - correction;
-  });
+  };
+  voronoi_cells<kDims>(cell, settings, 2, blend, is_far);
   for (int i = 0; i < kDims; ++i) out.position[i] += cell[i];
   return out;
 }

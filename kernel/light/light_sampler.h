@@ -59,6 +59,8 @@ struct LightsView {
   EnvironmentIrradiance environment_irradiance;
   /// Where the other lights' estimates sum to more, the environment is left to paths that follow the BSDF.
   float environment_yields_to = kInfinity;
+  /// Irradiance of an environment that may be asked for in media, by where they scatter light to: π × mean radiance. 0: it is not.
+  float sky_in_media = 0;
   bool environment_casts_caustics = true;  ///< as Light::casts_caustics
   /// By Light::motion_index: what takes a light's vectors from when the shutter is half done to another time, and where its P
   /// is then. They keep lengths.
@@ -305,6 +307,16 @@ RELIEF_KERNEL float lights_sun_pdf(const LightsView& view, Vec3f P, const LightR
   if (!(importance > 0.0f)) return 0.0f;
   const LightGroups groups = light_groups_eval(view, P, at);
   return groups.suns * (importance / groups.sun_sum) * sun_light_pdf(sun);
+}
+
+/// Share of the light that gets to a place in media, as far as it is known, that is the environment's; 0: it is not asked for there.
+RELIEF_KERNEL float lights_sky_share(const LightsView& view, Vec3f P)
+{
+  if (!(view.sky_in_media > 0.0f)) return 0.0f;
+  const LightGroups groups = light_groups_eval(view, P, {});
+  // From all sides comes four times the irradiance of a surface.
+  const float sky = 4.0f * view.sky_in_media;
+  return sky / (sky + groups.sun_sum + groups.finite_root.sum);
 }
 
 /// Density with which lights_sample, called at P, would have chosen a direction of the environment.

@@ -72,6 +72,9 @@ RELIEF_KERNEL constexpr std::uint32_t dimension_medium(std::uint32_t stretch, Me
   return 0x30000000u + stretch * static_cast<std::uint32_t>(MediumDimension::kCount) + static_cast<std::uint32_t>(use);
 }
 
+/// Dimension for sample_2d of where in a stretch that is in media the environment is asked for.
+RELIEF_KERNEL constexpr std::uint32_t dimension_medium_sky(std::uint32_t stretch) { return 0x38000000u + stretch; }
+
 /// Uses at the start of a photon; its bounces use the same dimensions as a camera path's.
 enum class PhotonDimension : std::uint32_t {
   kSource,  ///< 1D: which light, towards which caster

@@ -32,7 +32,8 @@ RELIEF_KERNEL void shade_sun_disks(const KernelGlobals& g, PathState& state, std
   }
 }
 
-/// Adds the radiance of the environment and of suns, weighted against next-event estimation.
+/// Adds the radiance of the environment and of suns, weighted against next-event estimation; nothing where it has been asked for in the
+/// path's place (shade_medium_sky).
 /// Reads the ray, throughput, pdf and scatter normal; writes the radiance. The path ends.
 RELIEF_KERNEL void shade_background(const KernelGlobals& g, PathState& state, std::uint32_t path, Counters& counters)
 {
@@ -50,6 +51,8 @@ RELIEF_KERNEL void shade_background(const KernelGlobals& g, PathState& state, st
     if (scatterings > 0 && !g.environment_visible_to_camera) return;
   }
   if (!is_shown && !is_kept) return;
+  if (state.media != nullptr && scatterings == 1 && state.media[path].is_lit_first && state.media[path].sky_is_asked)
+    return;
   if (path_leaves_to_photons(g, state.flags[path], -1)) return;
   const Vec3f D = path_direction(state, path);
   const bool is_backdrop = scatterings == 0 && g.has_backdrop;

@@ -9,8 +9,8 @@
 //
 // Where media vary, light is asked for and the path is scattered at one of the places that are asked on the way (medium_walk.h), each
 // chosen by what it carries. The walk always goes to the end of the stretch, so that light is asked for on every one of these as well.
-// Of what is thick, and behind the first event, paths go by collisions instead, and ask for light where they are scattered
-// (medium_flight.h): that takes less than half of the time, and no weights multiply from one event to the next.
+// Of what is thick and scatters more than once, and behind the first event, paths go by collisions instead, and ask for light where they
+// are scattered (medium_flight.h): that takes less than half of the time, and no weights multiply from one event to the next.
 #pragma once
 
 #include "kernel/counters.h"
@@ -73,13 +73,21 @@ RELIEF_KERNEL MediumPlace medium_place(const KernelGlobals& g, const MediumStret
   return place;
 }
 
+/// What becomes of a path on a stretch.
+struct MediumFate {
+  bool asks_sky = false;  ///< the environment is asked for in its place, should it be scattered
+  float offered = 1;      ///< by how much of what is scattered it is, beside what passes
+};
+
 /// Queues a shadow ray from a place on a stretch.
+/// @param fate  of the path: how likely it finds the light itself
 RELIEF_KERNEL void shade_medium_light_at(const KernelGlobals& g,
                                          const PathState& state,
                                          std::uint32_t path,
                                          const MediumStretch& at,
                                          const MediaSum& media,
                                          MediumPlace place,
+                                         MediumFate fate,
                                          ChoicePoint u,
                                          ShadowQueue& shadow)
 {
@@ -92,7 +100,8 @@ RELIEF_KERNEL void shade_medium_light_at(const KernelGlobals& g,
   if (!(light.pdf > 0.0f) || is_zero(answer.radiance)) return;
   if (answer.emitter != nullptr && (answer.emitter->hidden_from & kHiddenFromScattered) != 0) return;
   const PhaseEval phase = media_eval(media, at.D, light.wi);
-  const float weight = path_light_weight(g.light_technique, light.pdf, phase.pdf, light.delta);
+  const float found = fate.asks_sky && answer.emitter == nullptr ? phase.pdf : phase.pdf * fate.offered;
+  const float weight = path_light_weight(g.light_technique, light.pdf, found, light.delta);
   const Vec3f gain = place.carried * phase.f * answer.radiance * (weight / (light.pdf * place.pdf));
   if (is_zero(gain)) return;
   Vec3f D;
@@ -103,6 +112,59 @@ RELIEF_KERNEL void shade_medium_light_at(const KernelGlobals& g,
   const int bounces = path_bounces(state.bounces[path], BounceKind::kAll);
   shadow_queue_push(shadow, path, P, D, t_max, cone, gain,
                     path_shadow_scatterings(state, path, bounces + 1) | (bounces == 0 ? kMediumRay : 0u));
+}
+
+/// Asks the environment, from a place on a stretch, for what a path that is scattered there finds of it.
+RELIEF_KERNEL void shade_medium_sky_at(const KernelGlobals& g,
+                                       const PathState& state,
+                                       std::uint32_t path,
+                                       const MediumStretch& at,
+                                       const MediaSum& media,
+                                       MediumPlace place,
+                                       ShadowQueue& shadow)
+{
+  if (g.film.layout.denoising && (state.flags[path] & kPathSawFeature) == 0) {
+    film_add_denoising(g.film, state.pixel[path], sample_is_even(at.sample, g.log2_stream),
+                       place.carried * media.sigma_s * (1.0f / place.pdf), {});
+  }
+  const Vec3f P = at.O + at.D * place.distance;
+  const Vec2f u = sample_2d(at.hash, at.sample, dimension_medium_sky(at.number));
+  const Vec3f wi = media_sample(media, at.D, u);
+  const PhaseEval phase = media_eval(media, at.D, wi);
+  if (!(phase.pdf > 0.0f)) return;
+  const float weight = path_bsdf_weight(g.light_technique, phase.pdf, lights_environment_pdf(g.lights, P, {}, wi)) /
+                       (phase.pdf * place.pdf);
+  const Vec3f gain = place.carried * phase.f * environment_eval(g.lights.environment, wi) * weight;
+  if (is_zero(gain)) return;
+  const RayCone cone =
+      ray_cone_propagate({state.cone_width[path], state.cone_spread[path]}, state.t_min[path] + place.distance);
+  shadow_queue_push(shadow, path, P, wi, kInfinity, cone, gain, path_shadow_scatterings(state, path, 1) | kMediumRay);
+}
+
+/// Below this share of the light the environment is left to paths, and above the other one it is always asked for.
+inline constexpr float kLittleSky = 0.2f, kMuchSky = 0.3f;
+
+/// Decides what becomes of a path on a stretch.
+///
+/// One that is scattered for the last time finds lights alone, most of whose light has been asked for. Where a bright floor is seen
+/// through a dense cloud, 1 has three times the noise, and .1 twice as much in front of a sky that is left to paths.
+///
+/// Where such a stretch is what the camera sees the sky is asked for as well, by where the medium scatters light to, and next to nothing
+/// is left for the path to find: so it passes. Fog under a sky and a sun has a third of the noise so.
+/// @param distance  metres: from where it is seen how much light comes from the sky. Where light is asked for and the path is scattered at
+///                  different places, it must not depend on these
+RELIEF_KERNEL MediumFate
+medium_fate(const KernelGlobals& g, const PathState& state, std::uint32_t path, const MediumStretch& at, float distance)
+{
+  if (static_cast<int>(state.media[path].bounces) < g.limits.volume) return {};
+  if (path_bounces(state.bounces[path], BounceKind::kAll) == 0) {
+    const float share = lights_sky_share(g.lights, at.O + at.D * distance);
+    const float chance = (share - kLittleSky) * (1.0f / (kMuchSky - kLittleSky));
+    if (chance > 0.0f && sample_1d(at.hash, at.sample, dimension_medium(at.number, MediumDimension::kFate)) < chance) {
+      return {true, 0.05f};
+    }
+  }
+  return {false, 0.4f};
 }
 
 /// Chance with which light is asked for on a stretch: always on what the camera sees, and else by what is scattered there, as thin
@@ -124,6 +186,7 @@ RELIEF_KERNEL void shade_medium_light(const KernelGlobals& g,
                                       std::uint32_t path,
                                       const MediumStretch& at,
                                       const MediaSum& media,
+                                      MediumFate fate,
                                       ChoicePoint u,
                                       ShadowQueue& shadow)
 {
@@ -134,15 +197,28 @@ RELIEF_KERNEL void shade_medium_light(const KernelGlobals& g,
   place.pdf *= chance;
   if (!(place.pdf > 0.0f) || !(place.distance < kInfinity)) return;
   place.carried = path_throughput(state, path) * medium_transmittance(media.sigma_t, place.distance);
-  shade_medium_light_at(g, state, path, at, media, place, u, shadow);
+  shade_medium_light_at(g, state, path, at, media, place, fate, u, shadow);
 }
 
-/// By how much of what is scattered a path is, beside what passes. One that is scattered for the last time finds lights alone, most of
-/// whose light has been asked for. Where a bright floor is seen through a dense cloud 1 has three times the noise, and .1 twice as much
-/// in front of the sky.
-RELIEF_KERNEL float medium_offered(const KernelGlobals& g, const MediumState& m)
+/// Decides what becomes of a path on a stretch through media that are even, and asks the environment if that is so, from a place by how
+/// they weaken light.
+RELIEF_KERNEL MediumFate shade_medium_fate(const KernelGlobals& g,
+                                           const PathState& state,
+                                           std::uint32_t path,
+                                           const MediumStretch& at,
+                                           const MediaSum& media,
+                                           ShadowQueue& shadow)
 {
-  return static_cast<int>(m.bounces) >= g.limits.volume ? 0.4f : 1.0f;
+  const Vec2f u = sample_2d(at.hash, at.sample, dimension_medium(at.number, MediumDimension::kDirect));
+  MediumPlace place;
+  place.distance = free_distance_sample_within(channel_choose(media.sigma_t, at.chances, u.y), at.length, u.x);
+  const MediumFate fate = medium_fate(g, state, path, at, min(0.5f * at.length, 1.0f / max_component(media.sigma_t)));
+  if (!fate.asks_sky || !(place.distance < kInfinity)) return fate;
+  place.pdf = free_distance_pdf_within(media.sigma_t, at.chances, at.length, place.distance);
+  if (!(place.pdf > 0.0f)) return fate;
+  place.carried = path_throughput(state, path) * medium_transmittance(media.sigma_t, place.distance);
+  shade_medium_sky_at(g, state, path, at, media, place, shadow);
+  return fate;
 }
 
 /// Notes that a path is scattered: it covers the film whatever becomes of it, and a surface that it meets is not what the camera sees
@@ -154,18 +230,36 @@ RELIEF_KERNEL void medium_cover(const KernelGlobals& g, PathState& state, std::u
   film_add_clear(g.film, state.pixel[path], -1.0f);
 }
 
+/// Notes for denoising where a path is first scattered.
+/// @param albedo  of the place, with what the path has passed
+RELIEF_KERNEL void shade_medium_feature(const KernelGlobals& g,
+                                        PathState& state,
+                                        std::uint32_t path,
+                                        const MediumStretch& at,
+                                        Vec3f albedo)
+{
+  if (!g.film.layout.denoising || (state.flags[path] & kPathSawFeature) != 0) return;
+  state.flags[path] |= kPathSawFeature;
+  film_add_denoising(g.film, state.pixel[path], sample_is_even(at.sample, g.log2_stream), albedo, {});
+}
+
 /// Sends a path on from where it is scattered, or ends it.
-/// @param place  what is carried there is by the density of the place
+/// @param place   what is carried there is by the density of the place
+/// @param albedo  of the place, with what the path has passed
 RELIEF_KERNEL void shade_medium_scatter(const KernelGlobals& g,
                                         PathState& state,
                                         std::uint32_t path,
                                         const MediumStretch& at,
                                         const MediaSum& media,
                                         MediumPlace place,
+                                        Vec3f albedo,
+                                        MediumFate fate,
                                         Vec2f u,
                                         QueueView& next)
 {
   medium_cover(g, state, path);
+  // Where the environment is asked for, what is scattered has been told.
+  shade_medium_feature(g, state, path, at, fate.asks_sky ? Vec3f{} : albedo);
   const Vec3f wi = media_sample(media, at.D, u);
   const PhaseEval phase = media_eval(media, at.D, wi);
   if (!(phase.pdf > 0.0f)) return;
@@ -176,6 +270,7 @@ RELIEF_KERNEL void shade_medium_scatter(const KernelGlobals& g,
     state.first_throughput[path] = min(1.0f, carried);
     MediumState& m = state.media[path];
     m.is_lit_first = true;
+    m.sky_is_asked = fate.asks_sky;
     m.before[0] = state.direct[path];
     m.before[1] = state.indirect[path];
   } else {
@@ -190,7 +285,7 @@ RELIEF_KERNEL void shade_medium_scatter(const KernelGlobals& g,
   cone = ray_cone_scatter(cone, 1.0f);
   path_set_ray(state, path, at.O + at.D * place.distance, wi);
   state.throughput[path] = throughput;
-  state.pdf[path] = phase.pdf;
+  state.pdf[path] = phase.pdf * fate.offered;
   state.least_pdf[path] = min(state.least_pdf[path], phase.pdf);
   path_set_scattered_at(state, path, {});
   state.bounces[path] += 1u;
@@ -210,19 +305,6 @@ RELIEF_KERNEL void shade_medium_emission(const KernelGlobals& g, PathState& stat
   if (bounce == 0) film_add_emission(g.film, state.pixel[path], emitted);
   path_add_denoising(g, state, path, emitted);
   path_add_radiance(g, state, path, bounce, emitted);
-}
-
-/// Notes for denoising where a path is first scattered.
-/// @param albedo  of the place, with what the path has passed
-RELIEF_KERNEL void shade_medium_feature(const KernelGlobals& g,
-                                        PathState& state,
-                                        std::uint32_t path,
-                                        const MediumStretch& at,
-                                        Vec3f albedo)
-{
-  if (!g.film.layout.denoising || (state.flags[path] & kPathSawFeature) != 0) return;
-  state.flags[path] |= kPathSawFeature;
-  film_add_denoising(g.film, state.pixel[path], sample_is_even(at.sample, g.log2_stream), albedo, {});
 }
 
 /// One of several places, each kept as likely as by what it carries.
@@ -274,7 +356,7 @@ RELIEF_KERNEL MediaSum place_media(const MediumWalk& walk, const KeptPlace& kept
 }
 
 /// Optical depth from which on the camera's rays go by collisions, too. Below, what passes and what is scattered both show, and a look at
-/// all of the way has less noise.
+/// all of the way has less noise; as it has at any depth where light is scattered only once (a fire with smoke: half).
 inline constexpr float kThick = 2.0f;
 
 /// Whether a path behind its first event goes by collisions: so do all but those that are near a small light, of which light is asked for
@@ -311,16 +393,21 @@ RELIEF_KERNEL bool medium_flies(const KernelGlobals& g,
   }
   const Sample2dX4 u = sample_2d_x4(at.hash, at.sample, dimension_medium(at.number, MediumDimension::kLight));
   const MediaSum media = flight_media(ray, flight);
-  shade_medium_feature(g, state, path, at, path_throughput(state, path) * medium_albedo(media));
+  const Vec3f albedo = path_throughput(state, path) * medium_albedo(media);
+  const MediumFate fate = medium_fate(g, state, path, at, flight.distance);
+  if (fate.asks_sky) {
+    shade_medium_sky_at(g, state, path, at, media, {flight.distance, 1.0f, flight.left}, shadow);
+  } else {
+    shade_medium_feature(g, state, path, at, albedo);
+  }
   medium_cover(g, state, path);
   if (g.has_lights) {
-    shade_medium_light_at(g, state, path, at, media, {flight.distance, 1.0f, flight.left},
+    shade_medium_light_at(g, state, path, at, media, {flight.distance, 1.0f, flight.left}, fate,
                           choice_point(u.first_bits[0], u.first_bits[1]), shadow);
   }
-  const float offered = medium_offered(g, state.media[path]);
-  if (!(u.at[2].x < offered)) return false;
-  const MediumPlace place{flight.distance, 1.0f, flight.left * (1.0f / offered)};
-  shade_medium_scatter(g, state, path, at, media, place, u.at[1], next);
+  if (!(u.at[2].x < fate.offered)) return false;
+  const MediumPlace place{flight.distance, 1.0f, flight.left * (1.0f / fate.offered)};
+  shade_medium_scatter(g, state, path, at, media, place, albedo, fate, u.at[1], next);
   return false;
 }
 
@@ -341,6 +428,7 @@ RELIEF_KERNEL bool medium_flies(const KernelGlobals& g,
     const MediumRay ray = medium_ray_make(g, state.media[path], at.O, at.D, at.length);
     return shade_medium_flight(g, state, path, at, ray, seed, next, shadow);
   }
+  const bool goes_on_scattered = static_cast<int>(state.media[path].bounces) < g.limits.volume;
   MediumWalk walk = medium_walk_make(g, state.media[path], at.O, at.D, at.length, seed);
   Sample2dX4 u = sample_2d_x4(at.hash, at.sample, dimension_medium(at.number, MediumDimension::kLight));
   if (!last || medium_walk_shines(walk)) medium_walk_sample(walk, u.at[3].x);
@@ -350,7 +438,7 @@ RELIEF_KERNEL bool medium_flies(const KernelGlobals& g,
   }
   if (near.distance > 0.0f && near.distance < walk.reach) {
     medium_walk_approach(walk, near, counted_next(walk.numbers));
-  } else if (is_first && !last && min_component(walk.depth) > kThick) {
+  } else if (is_first && !last && goes_on_scattered && min_component(walk.depth) > kThick) {
     return shade_medium_flight(g, state, path, at, walk, seed, next, shadow);
   }
   const GraphRay ray = medium_graph_ray(state, path);
@@ -376,22 +464,27 @@ RELIEF_KERNEL bool medium_flies(const KernelGlobals& g,
   const Vec3f carried = throughput * left * depth_transmittance(walk.depth);
   if (!is_zero(emitted)) shade_medium_emission(g, state, path, emitted);
   const float passing = carried_share(carried);
+  const MediumFate fate =
+      scattered.total > 0.0f ? medium_fate(g, state, path, at, 0.5f * min(walk.reach, at.length)) : MediumFate{};
+  if (fate.asks_sky) {
+    shade_medium_sky_at(g, state, path, at, place_media(walk, scattered),
+                        {scattered.distance, scattered.share / scattered.total, scattered.weight}, shadow);
+  }
   if (lit.total > 0.0f) {
     const float asked = medium_asks(state, path, at, scattered.total / (scattered.total + passing));
     if (asked > 0.0f) {
       shade_medium_light_at(g, state, path, at, place_media(walk, lit),
-                            {lit.distance, asked * lit.share / lit.total, lit.weight},
+                            {lit.distance, asked * lit.share / lit.total, lit.weight}, fate,
                             choice_point(u.first_bits[0], u.first_bits[1]), shadow);
     }
   }
-  const float offered = scattered.total * medium_offered(g, state.media[path]);
+  const float offered = scattered.total * fate.offered;
   const float chance = offered > 0.0f ? offered / (offered + passing) : 0.0f;
   if (u.at[2].x < chance) {
     const MediaSum media = place_media(walk, scattered);
-    shade_medium_feature(g, state, path, at, throughput * medium_albedo(media));
     const MediumPlace place{scattered.distance, 1.0f,
                             scattered.weight * (scattered.total / (scattered.share * chance))};
-    shade_medium_scatter(g, state, path, at, media, place, u.at[1], next);
+    shade_medium_scatter(g, state, path, at, media, place, throughput * medium_albedo(media), fate, u.at[1], next);
     return false;
   }
   state.throughput[path] = passing > 0.0f ? carried / (1.0f - chance) : Vec3f{};
@@ -426,12 +519,13 @@ RELIEF_KERNEL bool shade_medium_stretch(const KernelGlobals& g,
   if (g.caustics.enabled) shade_medium_photons(g, state, path, at, media);
   at.chances = channel_chances(carried);
   const Sample2dX4 u = sample_2d_x4(at.hash, at.sample, dimension_medium(at.number, MediumDimension::kLight));
+  const MediumFate fate = shade_medium_fate(g, state, path, at, media, shadow);
   if (g.has_lights) {
-    shade_medium_light(g, state, path, at, media, choice_point(u.first_bits[0], u.first_bits[1]), shadow);
+    shade_medium_light(g, state, path, at, media, fate, choice_point(u.first_bits[0], u.first_bits[1]), shadow);
   }
   // Of what each channel decides, the part that scatters.
   const Vec3f passes = medium_transmittance(sigma_t, at.length);
-  const float offered = medium_offered(g, state.media[path]);
+  const float offered = fate.offered;
   const auto scatters = [offered](float pass) { return offered * (1.0f - pass) / (offered * (1.0f - pass) + pass); };
   const Vec3f q{scatters(passes.x), scatters(passes.y), scatters(passes.z)};
   const float chosen = channel_choose(q, at.chances, u.at[2].y);
@@ -441,8 +535,8 @@ RELIEF_KERNEL bool shade_medium_stretch(const KernelGlobals& g,
     const Vec3f left = medium_transmittance(sigma_t, distance);
     const float pdf = free_distance_pdf_within(sigma_t, at.chances * q, at.length, distance);
     if (!(pdf > 0.0f)) return false;
-    shade_medium_feature(g, state, path, at, carried);
-    shade_medium_scatter(g, state, path, at, media, {distance, pdf, throughput * left / pdf}, u.at[1], next);
+    const MediumPlace place{distance, pdf, throughput * left / pdf};
+    shade_medium_scatter(g, state, path, at, media, place, carried, fate, u.at[1], next);
     return false;
   }
   const float chance = dot(at.chances, Vec3f{1, 1, 1} - q);

@@ -27,6 +27,7 @@ struct MediumState {
   bool hit_front;            ///< the hit is on the outside
   Vec3f hit_P, hit_Ng;       ///< of such a hit, world; the geometric normal is on the ray's side, and not unit
   bool is_lit_first;         ///< the first event of the path was in a medium
+  bool sky_is_asked;         ///< and the environment was asked for there in the path's place
   Vec3f before[2];           ///< if so, the path's direct and indirect light before it
   Vec3f lit;                 ///< else, light that was asked for in media before the first event
   Vec3f caustic;             ///< and what photons brought there

@@ -9,7 +9,6 @@ struct AbsorptionVolume {
   static constexpr const char* kName = "absorption";
   static constexpr VolumeInput kInputs[] = {{"color", true, 0.8f}, {"density", false, 1}};
   static constexpr int kPhases = 0;
-  static constexpr bool kShines = false;
 };
 
 RELIEF_KERNEL void medium_add(AbsorptionVolume, float weight, VolumeNumbers& in, Medium& medium)

@@ -9,7 +9,6 @@ struct EmissionVolume {
   static constexpr const char* kName = "emission";
   static constexpr VolumeInput kInputs[] = {{"color", true, 1, true}, {"strength", false, 1, true}};
   static constexpr int kPhases = 0;
-  static constexpr bool kShines = true;
 };
 
 RELIEF_KERNEL void medium_add(EmissionVolume, float weight, VolumeNumbers& in, Medium& medium)

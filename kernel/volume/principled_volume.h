@@ -18,7 +18,6 @@ struct PrincipledVolume {
                                             {"blackbodyTint", true, 1, true},
                                             {"temperature", false, 1000}};
   static constexpr int kPhases = 1;
-  static constexpr bool kShines = true;
 };
 
 /// Light that a black body of a volume sends out, as Cycles has it: not Planck's spectra, but colours of a luminance of 1 times

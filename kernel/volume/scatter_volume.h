@@ -11,7 +11,6 @@ struct ScatterVolume {
                                             {"density", false, 1},
                                             {"anisotropy", false, 0, true}};
   static constexpr int kPhases = 1;
-  static constexpr bool kShines = false;
 };
 
 RELIEF_KERNEL void medium_add(ScatterVolume, float weight, VolumeNumbers& in, Medium& medium)

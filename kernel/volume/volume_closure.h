@@ -29,7 +29,6 @@ struct VolumeInput {
 //   kName      in files
 //   kInputs    VolumeInput, in their order
 //   kPhases    how many phase functions it has
-//   kShines    whether it may emit
 // and two functions, both of which read those inputs that they need, from the first on:
 //   medium_add(Type, weight, VolumeNumbers&, Medium&)    adds what it comes to at a point; the weight is above 0
 //   rate_add(Type, weight, in, MediumRate&)              adds a bound of that; in.number() and in.color() are ValueBounds

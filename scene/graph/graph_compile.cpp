@@ -8,6 +8,7 @@
 
 #include "kernel/bsdf/closure_kinds.h"
 #include "kernel/graph/graph_eval.h"
+#include "kernel/graph/voronoi.h"
 
 namespace relief {
 namespace {
@@ -188,6 +189,14 @@ void GraphBuilder::Compilation::free_registers(const Operation& operation, std::
 std::vector<std::uint16_t> GraphBuilder::Compilation::placed(const Operation& operation)
 {
   std::vector<std::uint16_t> immediates = operation.immediates;
+  if (operation.op >= GraphOp::voronoi_1d && operation.op <= GraphOp::voronoi_4d) {
+    // Distances come first, and once more last.
+    const bool is_bare =
+        std::none_of(operation.outputs.begin() + 1, operation.outputs.end() - 1,
+                     [this](GraphScalar a) { return last_use_[static_cast<std::size_t>(a.index)] >= 0; });
+    if (is_bare) immediates[2] |= kVoronoiBare;
+    return immediates;
+  }
   if (operation.op == GraphOp::voxels) {
     const std::size_t from = immediates[0];
     immediates[0] = static_cast<std::uint16_t>(program_.voxels.size());

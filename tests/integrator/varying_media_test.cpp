@@ -255,7 +255,7 @@ TEST(VaryingMedia, WithoutBoundsAreWarnedAboutAndRight)
   expect_mean(scene, 256, std::exp(-0.2 * std::log(1.002 / 0.002)), 1e-6);
 }
 
-/// Rays through a density by what it is taken for.
+/// Rays through a density by what it is taken for. It sends out .6 of itself.
 class MediumWalkIn : public testing::TestWithParam<RateBox> {
  protected:
   /// Compares means of rays through a density of 1 + z / 2, of which `albedo` scatters, from z = 1 to −1.
@@ -269,6 +269,8 @@ class MediumWalkIn : public testing::TestWithParam<RateBox> {
     v.add(VolumeClosureKind::kScatter, {color, color, color, v.z(0.5, 1), black});
     const GraphScalar rest = v.number(albedo);
     v.add(VolumeClosureKind::kAbsorption, {rest, rest, rest, v.z(0.5, 1)});
+    const GraphScalar one = v.number(1);
+    v.add(VolumeClosureKind::kEmission, {one, one, one, v.z(0.3, 0.6)});
     add_varying(scene, box_mesh({1, 1, 1}), v.program());
     const SceneContext context(scene);
     VaryingMedium medium = context.globals.varying_media[0];
@@ -345,6 +347,27 @@ TEST_P(MediumWalkIn, FliesAsOftenAsItScattersAndPasses)
     medium_fly(g, ray, {}, numbers, {1, 1, 1}, flight);
     if (!flight.scatters) return std::array{static_cast<double>(flight.left.x), 0.0};
     return std::array{0.0, static_cast<double>(flight.left.x * flight_media(ray, flight).sigma_s.x)};
+  });
+}
+
+TEST_P(MediumWalkIn, FliesPastWhatShines)
+{
+  // Of an albedo of 1 as of any: what is scattered goes on elsewhere.
+  const double share = 1 - std::exp(-2.0), expected[2] = {0.6 * share, share};
+  expect_means(1, expected, [](const KernelGlobals& g, const MediumState& inside, std::uint32_t seed) {
+    CountedNumbers numbers{seed};
+    MediumFlight flight;
+    const MediumRay ray = medium_ray_make(g, inside, kRayStart, kRayDown, 2);
+    medium_fly(g, ray, {}, numbers, {1, 1, 1}, flight);
+    double scattered = 0;
+    if (flight.scatters) {
+      // What the medium is where it is scattered, by what it says and by where that is.
+      const MediaSum media = flight_media(ray, flight);
+      const float z = kRayStart.z - flight.distance;
+      EXPECT_NEAR(media.sigma_s.x, 1 + 0.5f * z, 1e-5f);
+      scattered = static_cast<double>(flight.left.x * media.sigma_s.x);
+    }
+    return std::array{static_cast<double>(flight.emitted.x), scattered};
   });
 }
 

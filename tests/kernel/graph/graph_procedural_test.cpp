@@ -1,6 +1,7 @@
 // Noise, cells, terrain, bricks and checkers of value graphs against a plain implementation in double precision.
 #include <gtest/gtest.h>
 
+#include "kernel/graph/voronoi.h"
 #include "tests/kernel/graph/one_operation.h"
 #include "tests/oracle/procedural.h"
 
@@ -163,6 +164,43 @@ TEST_P(GraphProcedural, CellsAreWorleys)
         }
       }
       EXPECT_EQ(num_off, 0) << "feature " << feature << ", metric " << metric << " of " << num_all;
+    }
+  }
+}
+
+// Cells that are too far for all eight points are left out, and what nobody asks for.
+TEST_P(GraphProcedural, SmoothCellsAreTheSameOfPointsTogetherAndApart)
+{
+  HardNumbers numbers(8);
+  for (std::uint16_t metric = 0; metric < 4; ++metric) {
+    for (const unsigned flags : {0u, unsigned{kVoronoiFar}, unsigned{kVoronoiPcg}}) {
+      int num_off = 0;
+      for (int round = 0; round < (dims() < 4 ? 40 : 8); ++round) {
+        const auto middle = point(numbers, round % 2 == 0 ? 4.0f : 500.0f);
+        const float spread = round % 3 == 0 ? 1.0f : 0.1f;
+        std::vector<std::vector<float>> together(dims());
+        for (std::size_t i = 0; i < dims(); ++i) {
+          for (const float more : numbers.row(-spread, spread)) together[i].push_back(middle[i][0] + more);
+        }
+        const std::vector<std::vector<float>> settings = {numbers.row(0.01f, 0.5f), numbers.row(0.5f, 4),
+                                                          std::vector<float>(8, round % 5 == 0 ? 1.0f : 0.4f)};
+        together.insert(together.end(), settings.begin(), settings.end());
+        const Op op = of_dimensions(Op::voronoi_1d, dims());
+        constexpr std::uint16_t kSmooth = 2;
+        const auto all_flags = static_cast<std::uint16_t>(flags);
+        const auto bare_flags = static_cast<std::uint16_t>(flags | kVoronoiBare);
+        const test::Outputs out = run_one(run(), op, together, {kSmooth, metric, all_flags});
+        const test::Outputs bare = run_one(run(), op, together, {kSmooth, metric, bare_flags});
+        for (std::size_t k = 0; k < 8; ++k) {
+          auto apart = point(numbers, 1000.0f);
+          for (std::size_t i = 0; i < dims(); ++i) apart[i][k] = together[i][k];
+          apart.insert(apart.end(), settings.begin(), settings.end());
+          const test::Outputs alone = run_one(run(), op, apart, {kSmooth, metric, all_flags});
+          for (std::size_t o = 0; o < alone.size(); ++o) num_off += alone[o][k] != out[o][k] ? 1 : 0;
+          num_off += bare[0][k] != out[0][k] || bare[8][k] != out[8][k] ? 1 : 0;
+        }
+      }
+      EXPECT_EQ(num_off, 0) << "metric " << metric << ", flags " << flags;
     }
   }
 }
