@@ -131,6 +131,21 @@ def test_hair_bsdf():
     assert_agrees(scene, samples=128)
 
 
+def test_hair_bsdfs_mixed():
+    """As wool is made: what one sends through the strand the other reflects there is not weighed against."""
+    scene = _stage()
+    material, tree, through = new_material("wool", "ShaderNodeBsdfHair", Color=(0.9, 0.85, 0.8, 1), RoughnessU=0.4)
+    through.component = "Transmission"
+    reflected = tree.nodes.new("ShaderNodeBsdfHair")
+    reflected.inputs["Color"].default_value, reflected.inputs["RoughnessU"].default_value = (0.9, 0.85, 0.8, 1), 0.4
+    mix = tree.nodes.new("ShaderNodeMixShader")
+    for socket, part in zip(mix.inputs[1:], (reflected, through)):
+        tree.links.new(part.outputs[0], socket)
+    tree.links.new(mix.outputs[0], next(n for n in tree.nodes if n.type == "OUTPUT_MATERIAL").inputs[0])
+    _grow(material, shape="RIBBONS", count=4000, radius_scale=0.02)
+    assert_agrees(scene, samples=96)
+
+
 def test_principled_hair():
     for parametrization, values in (
         ("MELANIN", {"Melanin": 0.9, "Random Color": 0.5}),
