@@ -167,7 +167,8 @@ RELIEF_KERNEL constexpr MixtureReachTable mixture_reach_table_make()
     // for it, nor noisier.
     const bool shines[2] = {reaches(false), reaches(true)};
     // A strand's lobe samples directions of both sides, but for others' samples its density counts on its own alone.
-    const bool is_found[2] = {traits.is_strand ? shines[0] : shines[1] || (shines[0] && traits.is_microfacet), shines[1]};
+    const bool is_found[2] = {traits.is_strand ? shines[0] : shines[1] || (shines[0] && traits.is_microfacet),
+                              shines[1]};
     for (const bool sampled : {false, true}) {
       const int bit = reach_bit(at, sampled);
       std::uint32_t& bits = table.of[kind][maths][on_curve].bits;
