@@ -407,8 +407,16 @@ TEST_F(RenderProgram, ADisplacedSquareIsHitWhereItIs)
   folder_.write("rays.txt", "0.5 0.25 3 0 0 -1\n");
   EXPECT_EQ(render(scene, file("a.exr")).exit_code, 0);
   const Outcome outcome = run({"trace", scene, "--rays", file("rays.txt")});
-  EXPECT_NE(outcome.output.find("\n1,3.25,0.5,0.25,-0.25,0,0,1,"), std::string::npos)
-      << outcome.output << outcome.errors;
+  const std::size_t line = outcome.output.find("\n1,");
+  ASSERT_NE(line, std::string::npos) << outcome.output << outcome.errors;
+  std::istringstream numbers(outcome.output.substr(line + 1));
+  // The last bit is the processor's: Embree's kernels round each in their way.
+  for (const double expected : {1.0, 3.25, 0.5, 0.25, -0.25, 0.0, 0.0, 1.0}) {
+    double number = 0;
+    char comma = 0;
+    numbers >> number >> comma;
+    EXPECT_NEAR(number, expected, 1e-6) << outcome.output;
+  }
 }
 
 TEST_F(RenderProgram, APictureKnowsItsCommandLine)
