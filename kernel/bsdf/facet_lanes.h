@@ -110,7 +110,7 @@ RELIEF_KERNEL F8 beckmann_visible_slope(F8 tan_o, F8 u, I8 wanted)
     low = value < 0.0f ? b : low;
     high = value < 0.0f ? high : b;
     const F8 next = b - value / (1.0f - slope * tan_o);
-    b = wanted ? ((next > low) & (next < high) ? next : 0.5f * (low + high)) : b;
+    b = wanted ? (((next > low) & (next < high)) ? next : 0.5f * (low + high)) : b;
     slope = wanted ? erf_inverse(b) : slope;
   }
   return slope;
