@@ -66,6 +66,14 @@ RELIEF_KERNEL float beckmann_eval(const Beckmann& lobe, Vec3f wo, Vec3f wi, floa
   return 0.25f * D / (wo.z * __builtin_fabsf(wi.z) * masking);
 }
 
+/// Coefficients of erf_inverse over its argument, from the highest power down: of −log(1 − x²) − 2.5 up to 5, and beyond of the root − 3.
+inline constexpr float kErfInverseNear[9] = {2.81022636e-08f,  3.43273939e-07f, -3.5233877e-06f,
+                                             -4.39150654e-06f, 0.00021858087f,  -0.00125372503f,
+                                             -0.00417768164f,  0.246640727f,    1.50140941f};
+inline constexpr float kErfInverseFar[9] = {-0.000200214257f, 0.000100950558f, 0.00134934322f,
+                                            -0.00367342844f,  0.00573950773f,  -0.0076224613f,
+                                            0.00943887047f,   1.00167406f,     2.83297682f};
+
 /// Inverse of the error function.
 /// @param x  (−1, 1); clamped next to the ends
 /// @source   Giles 2010, "Approximating the erfinv function", single precision
@@ -73,30 +81,11 @@ RELIEF_KERNEL float erf_inverse(float x)
 {
   const float a = min(__builtin_fabsf(x), 0.99999994f);
   const float w = -std::log((1.0f - a) * (1.0f + a));
-  float p;
-  if (w < 5.0f) {
-    const float t = w - 2.5f;
-    p = 2.81022636e-08f;
-    p = 3.43273939e-07f + p * t;
-    p = -3.5233877e-06f + p * t;
-    p = -4.39150654e-06f + p * t;
-    p = 0.00021858087f + p * t;
-    p = -0.00125372503f + p * t;
-    p = -0.00417768164f + p * t;
-    p = 0.246640727f + p * t;
-    p = 1.50140941f + p * t;
-  } else {
-    const float t = __builtin_sqrtf(w) - 3.0f;
-    p = -0.000200214257f;
-    p = 0.000100950558f + p * t;
-    p = 0.00134934322f + p * t;
-    p = -0.00367342844f + p * t;
-    p = 0.00573950773f + p * t;
-    p = -0.0076224613f + p * t;
-    p = 0.00943887047f + p * t;
-    p = 1.00167406f + p * t;
-    p = 2.83297682f + p * t;
-  }
+  const bool is_near = w < 5.0f;
+  const float t = is_near ? w - 2.5f : __builtin_sqrtf(w) - 3.0f;
+  const float* const c = is_near ? kErfInverseNear : kErfInverseFar;
+  float p = c[0];
+  for (int i = 1; i < 9; ++i) p = c[i] + p * t;
   return p * x;
 }
 

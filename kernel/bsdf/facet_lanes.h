@@ -69,24 +69,11 @@ RELIEF_KERNEL F8 erf_inverse(F8 x)
   const F8 a = min(abs(x), splat8(0.99999994f));
   const F8 w = -log8((1.0f - a) * (1.0f + a));
   const F8 t = w - 2.5f, s = sqrt(max(w, splat8(0.0f))) - 3.0f;
-  F8 p = splat8(2.81022636e-08f);
-  p = 3.43273939e-07f + p * t;
-  p = -3.5233877e-06f + p * t;
-  p = -4.39150654e-06f + p * t;
-  p = 0.00021858087f + p * t;
-  p = -0.00125372503f + p * t;
-  p = -0.00417768164f + p * t;
-  p = 0.246640727f + p * t;
-  p = 1.50140941f + p * t;
-  F8 q = splat8(-0.000200214257f);
-  q = 0.000100950558f + q * s;
-  q = 0.00134934322f + q * s;
-  q = -0.00367342844f + q * s;
-  q = 0.00573950773f + q * s;
-  q = -0.0076224613f + q * s;
-  q = 0.00943887047f + q * s;
-  q = 1.00167406f + q * s;
-  q = 2.83297682f + q * s;
+  F8 p = splat8(kErfInverseNear[0]), q = splat8(kErfInverseFar[0]);
+  for (int i = 1; i < 9; ++i) {
+    p = kErfInverseNear[i] + p * t;
+    q = kErfInverseFar[i] + q * s;
+  }
   return (w < 5.0f ? p : q) * x;
 }
 

@@ -31,8 +31,7 @@ RELIEF_KERNEL void graph_footprint(const Vec3x8& Ng, F8 footprint, const Vec3x8&
   const I8 is_parallel = ~(dot(across, across) > 1e-12f);
   Vec3x8 x = normalize(across);
   if (mask_of(is_parallel) != 0) x = select(is_parallel, frame_from_normal(Ng).s, x);
-  constexpr float kRoundings = 256.0f;
-  const F8 width = max(footprint, kRoundings * max(P_error.x, max(P_error.y, P_error.z)));
+  const F8 width = max(footprint, kFootprintRoundings * max(P_error.x, max(P_error.y, P_error.z)));
   out.dPdx = x * width;
   out.dPdy = cross(Ng, x) * width;
 }

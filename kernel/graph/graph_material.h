@@ -32,6 +32,9 @@ struct GraphPoint {
   const GraphFootprint* footprint_axes = nullptr;  ///< see graph_footprint; null: not known yet
 };
 
+/// Least footprint over the rounding of its point: a ray without width still needs slopes.
+inline constexpr float kFootprintRoundings = 256.0f;
+
 RELIEF_KERNEL GraphFootprint graph_footprint(const GraphPoint& at)
 {
   if (at.footprint_axes != nullptr) return *at.footprint_axes;
@@ -41,9 +44,7 @@ RELIEF_KERNEL GraphFootprint graph_footprint(const GraphPoint& at)
   const Vec3f across = cross(Vec3f{1, 1, -1}, Ng);
   const bool is_parallel = !(length_squared(across) > 1e-12f);
   const Vec3f x = is_parallel ? frame_from_normal(Ng).s : normalize(across);
-  // A ray without width still needs slopes: over what rounding leaves of its point.
-  constexpr float kRoundings = 256.0f;
-  const float width = max(at.footprint, kRoundings * max_component(at.hit->P_error));
+  const float width = max(at.footprint, kFootprintRoundings * max_component(at.hit->P_error));
   return {x * width, cross(Ng, x) * width};
 }
 
