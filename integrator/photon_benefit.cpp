@@ -51,15 +51,6 @@ std::vector<GroupLobes> group_lobes(const Scene& scene, const PhotonSources& sou
   return groups;
 }
 
-/// How far a facet turns a path, over what a mirror's does, by 2 of its tilt. Where paths ask for a light beyond glass they are on
-/// their way out, and refraction turns them by η − 1; for one inside they are on their way in, and it is 1 − 1/η.
-double bending(const GroupLobes& lobes, bool is_light_inside)
-{
-  if (!(lobes.ior > 0)) return 1;
-  const double turn = std::abs(lobes.ior - 1) / (is_light_inside ? lobes.ior : 1.0);
-  return std::clamp(0.5 * turn, 0.05, 1.0);
-}
-
 /// Least width α of what paths see after a diffuse bounce: as path_blur.
 double blurred_alpha(double filter_glossy)
 {
@@ -82,11 +73,12 @@ std::vector<float> pilot_factors(const SceneContext& context,
     CausticLight light;
     if (source.light.light_index < 0) {
       light = {4 * context.lights.environment_flux_density,
-               std::max(context.lights.environment_solid_angle, lobe_solid_angle(bending(of_group, false) * alpha))};
+               std::max(context.lights.environment_solid_angle,
+                        lobe_solid_angle(caster_bending(of_group.ior, false) * alpha))};
     } else {
       Light storage;
       const Light& lamp = lights_at(lights, source.light, storage, 0.5f);
-      light = caustic_light(lamp, box, bending(of_group, box_contains(box, lamp.P)) * alpha);
+      light = caustic_light(lamp, box, caster_bending(of_group.ior, box_contains(box, lamp.P)) * alpha);
     }
     factors.push_back(static_cast<float>(
         kTrace * caustic_second_moment(light, static_cast<double>(settings.clamp_indirect), settings.samples)));
@@ -355,6 +347,13 @@ LightSeen light_seen(FlatLight, const Light& light, const Box3& box)
 }
 
 }  // namespace
+
+double caster_bending(double ior, bool is_light_inside)
+{
+  if (!(ior > 0)) return 1;
+  const double turn = std::abs(ior - 1) / (is_light_inside ? ior : 1.0);
+  return std::clamp(0.5 * turn, 0.05, 1.0);
+}
 
 CausticLight caustic_light(const Light& light, const Box3& box, double alpha)
 {

@@ -38,8 +38,14 @@ struct CausticLight {
   double solid_angle = 0;  ///< of the light or of the caster's lobe, the larger one: paths spread noise over it
 };
 
-/// @param box    around the casters
-/// @param alpha  of the sharpest of their lobes
+/// How far a slightly tilted facet turns a path, over the 2 tilts of a mirror. Where paths ask for a light beyond glass they are on
+/// their way out, and refraction turns them by η − 1; for one inside they are on their way in, and it is 1 − 1/η (Snell's law).
+/// @param ior  η of glass over air; 0: the caster mirrors
+/// @return     0.05 to 1
+double caster_bending(double ior, bool is_light_inside);
+
+/// @param box    around the casters, world
+/// @param alpha  of the sharpest of their lobes, times caster_bending
 CausticLight caustic_light(const Light& light, const Box3& box, double alpha);
 
 /// E[X²] over the mean of X, where X is what one path brings of a caustic, W/m²/sr. As clamped paths lose light, it is that of

@@ -190,6 +190,17 @@ TEST(PhotonBenefit, ALampShinesOnWhatIsNearIt)
   EXPECT_NEAR(irradiance({0, 20, 0}), 5.0 / 400, 1e-6);
 }
 
+TEST(PhotonBenefit, FacetsOfGlassTurnPathsByWhatSnellSays)
+{
+  constexpr double kTilt = 1e-4;
+  for (const double ior : {1.2, 1.45, 2.4}) {
+    const double out = std::asin(ior * std::sin(kTilt)) - kTilt, in = kTilt - std::asin(std::sin(kTilt) / ior);
+    EXPECT_NEAR(caster_bending(ior, false), out / (2 * kTilt), 1e-6);
+    EXPECT_NEAR(caster_bending(ior, true), in / (2 * kTilt), 1e-6);
+  }
+  EXPECT_EQ(caster_bending(0, false), 1);
+}
+
 TEST(PhotonBenefit, ALampInGlassHasPhotonsThoughPathsBlurWhatTheySee)
 {
   // As Blender renders by default. A blurred facet of glass still turns a path little: nearly all of it misses the lamp.
@@ -225,6 +236,8 @@ TEST(PhotonBenefit, ALampInGlassHasPhotonsThoughPathsBlurWhatTheySee)
   const double measured = noise(CausticsMode::kOff) / noise(CausticsMode::kOn);
   std::printf("a lamp in glass, paths over photons: told %.3f, measured %.3f\n", told.error_ratio, measured);
   EXPECT_GT(measured, told.cost_ratio);
+  // Were light spread as by mirrors, half of that would be told.
+  EXPECT_GT(told.error_ratio, measured);
 }
 
 TEST(PhotonBenefit, ClampedPathsHaveLessNoiseTheBrighterTheLight)
