@@ -73,7 +73,7 @@ class VolumeWriter(ClosureWriter):
 
     def _weigh_emission(self, inputs, weight):
         """Dims what a Principled Volume emits: its closure takes the weight for what absorbs and scatters alone."""
-        inputs["emissionStrength"] = self._times(inputs["emissionStrength"], weight)
+        inputs["emissionStrength"] = self.times(inputs["emissionStrength"], weight)
         tint = inputs["blackbodyTint"]
         if isinstance(tint, dict) or isinstance(weight, dict):
             tint = self.graph.op("vector-math", {"a": tint, "scale": weight}, "vector", operation="scale")
