@@ -31,11 +31,12 @@ class Coverage:
 _ENDS = {"ShaderNodeVolumeAbsorption", "ShaderNodeDisplacement", "ShaderNodeVectorDisplacement"}
 
 
-def coverage_of(ends, problems):
+def coverage_of(ends, problems, owner):
     """Coverage of all nodes behind some outputs.
 
     @param  ends      nodes.Source of what is linked to a material's output
     @param  problems  texts by the keys of nodes, as nodes.Source has them
+    @param  owner     of the tree
     """
     reached = _reached(ends)
     missing = []
@@ -45,7 +46,7 @@ def coverage_of(ends, problems):
         if reason is None and not (graph.knows(node) or surface.knows(node) or node.bl_idname in _ENDS):
             reason = f'node "{node.name}" ({node.bl_label})'
         if reason is not None:
-            missing.append((node.name, reason))
+            missing.append(tuple(nodes.original_names(owner, text) for text in (node.name, reason)))
     return Coverage(len(reached), tuple(missing))
 
 

@@ -205,7 +205,7 @@ def _uv_range(material, name):
 
 def _move_of_output(material, settings, textures, graph):
     """What is linked to a material output's Displacement asks for; None: nothing that is understood."""
-    output = nodes.active_output(material.node_tree, "ShaderNodeOutputMaterial")
+    output = nodes.active_output(nodes.tree_of(material), "ShaderNodeOutputMaterial")
     source = nodes.linked(output.inputs["Displacement"]) if output else None
     if source is None:
         return None

@@ -18,6 +18,8 @@ class _NoWriter:
 class _NoImages:
     """An ImageExporter that finds every image."""
 
+    moment = (0.0, 0.0)
+
     def stored_uri(self, *_):
         return "image", False
 

@@ -28,6 +28,7 @@ class GraphWriter:
     @param  warn            called with what a value is, if it is no number, and what was used instead
     @param  material_index  Pass Index of the material
     @param  view_layer      gives the things whose properties are the view layer's attributes, the first one first
+    @param  moment          (frame, seconds) that the scene is at
     nodes          JSON of the nodes so far
     uses_generated whether meshes need _GENERATED
     uses_tangents  whether tangents along the uv map that is active in renders are read
@@ -38,7 +39,16 @@ class GraphWriter:
     not_understood texts by the keys of the nodes that they are about
     """
 
-    def __init__(self, coordinate_set, texture, ies, warn=lambda what, instead: None, material_index=0, view_layer=tuple):
+    def __init__(
+        self,
+        coordinate_set,
+        texture,
+        ies,
+        warn=lambda what, instead: None,
+        material_index=0,
+        view_layer=tuple,
+        moment=(0.0, 0.0),
+    ):
         self.coordinate_set = coordinate_set
         self.texture = texture
         self.ies = ies
@@ -48,6 +58,7 @@ class GraphWriter:
         self.voxels = None
         self.material_index = material_index
         self.view_layer = view_layer
+        self.moment = moment
         self.attributes = []
         self.values = []
         self.own_normal = None

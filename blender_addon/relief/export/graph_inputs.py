@@ -103,7 +103,7 @@ _LIGHT_PATH = {
 
 def _light_path(g, source):
     name = source.socket.identifier
-    if name == "Is Volume Scatter Ray":
+    if name in {"Is Volume Scatter Ray", "Portal Depth"}:  # portals are warned about themselves
         return _constant(g, 0.0)
     if name not in _LIGHT_PATH:
         raise not_understood(source.node, name)
@@ -289,6 +289,23 @@ def _ies(g, source):
     return _output(g.add("ies-texture", inputs, uri=uri, maths=compat.TEXTURE_MATHS), "factor")
 
 
+def _scene_time(g, source):
+    """The same while the shutter is open, as in Cycles."""
+    frame, seconds = g.moment
+    return _constant(g, frame if source.socket.identifier == "Frame" else seconds)
+
+
+def _implicit_conversion(g, source):
+    """What Blender puts into trees that it makes (nodes.tree_of), where types differ."""
+    node, groups = source.node, source.groups
+    value = g.value(node.inputs[0], groups)
+    inner = nodes.follow(node.inputs[0], groups)
+    from_color = inner is not None and inner.socket.type == "RGBA"
+    if node.data_type in {"FLOAT", "INT", "BOOLEAN"} and from_color:
+        value = g.grey(value)
+    return value if isinstance(value, dict) else _constant(g, value)
+
+
 def _volume_info(g, source):
     name = source.socket.identifier
     if g.voxels is not None and name.lower() in g.voxels:
@@ -410,6 +427,8 @@ OUTPUTS = {
     "ShaderNodeTexIES": _ies,
     "ShaderNodeVolumeInfo": _volume_info,
     "ShaderNodeHairInfo": _hair_info,
+    "GeometryNodeInputSceneTime": _scene_time,
+    "NodeImplicitConversion": _implicit_conversion,
     "ShaderNodePointInfo": _point_info,
     "ShaderNodeBlackbody": _made_color("blackbody", "Temperature"),
     "ShaderNodeWavelength": _made_color("wavelength", "Wavelength"),

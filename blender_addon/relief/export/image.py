@@ -39,12 +39,16 @@ class ImageExporter:
     """Finds or makes the file of each image once.
 
     @param  writer  GltfWriter
-    @param  frame   Blender's current frame, for image sequences
+    @param  scene   bpy scene, whose current frame image sequences are at
+
+    moment  (frame, its fraction with it; seconds) that the scene is at
     """
 
-    def __init__(self, writer, frame):
+    def __init__(self, writer, scene):
         self._writer = writer
-        self._frame = frame
+        self._frame = scene.frame_current
+        frame = scene.frame_current_final
+        self.moment = (frame, frame * scene.render.fps_base / scene.render.fps)
         self._uris = {}
         self._associated = {}
         self._of_pixels = set()

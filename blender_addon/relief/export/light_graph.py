@@ -22,9 +22,13 @@ def read_emission(light, random, writer, images, warn):
     @param  images  ImageExporter
     @return         three numbers, or a graph for RELIEF_light and RELIEF_area_light
     """
-    output = nodes.active_output(light.node_tree, "ShaderNodeOutputLight")
-    tree = EmissionTree(LightGraph(light, random, writer, images, warn), warn)
+
+    def warn_of_own(what, instead=""):
+        warn(nodes.original_names(light, what), instead)
+
+    tree = EmissionTree(LightGraph(light, random, writer, images, warn_of_own), warn_of_own)
     with nodes.reading():
+        output = nodes.active_output(nodes.tree_of(light), "ShaderNodeOutputLight")
         tree.collect(nodes.linked(output.inputs["Surface"]) if output else None)
         total = tree.total()
     if isinstance(total, list):
@@ -53,7 +57,7 @@ class LightGraph(GraphWriter):
         def texture(node):
             return image_options(node, writer, images, warn)
 
-        super().__init__(lambda name: None, texture, lambda node: ies_uri(node, writer), warn)
+        super().__init__(lambda name: None, texture, lambda node: ies_uri(node, writer), warn, moment=images.moment)
         self._light = light
         self._random = random
 

@@ -64,7 +64,7 @@ def has_volume(material):
     if not material.use_nodes or material.node_tree is None:
         return False
     with nodes.reading():
-        output = nodes.active_output(material.node_tree, "ShaderNodeOutputMaterial")
+        output = nodes.active_output(nodes.tree_of(material), "ShaderNodeOutputMaterial")
         return output is not None and nodes.linked(output.inputs["Volume"]) is not None
 
 
@@ -126,6 +126,7 @@ class MaterialJob:
         self._voxels = voxels
         self._writer = writer
         self._images = images
+        self._material = material
         self._name = material.name if material else "default"
         self._report = report
         self._filters_glossy = filters_glossy(settings.id_data)
@@ -144,6 +145,7 @@ class MaterialJob:
                 warn=self._warn,
                 material_index=material.pass_index if material else 0,
                 view_layer=view_layer,
+                moment=images.moment,
             )
 
         self._graph, self._height_graph = new_graph(), new_graph()
@@ -162,7 +164,7 @@ class MaterialJob:
 
     def _export_nodes(self, material, settings):
         self._textures.takes_bump = bump_displaces(material, settings)
-        output = nodes.active_output(material.node_tree, "ShaderNodeOutputMaterial")
+        output = nodes.active_output(nodes.tree_of(material), "ShaderNodeOutputMaterial")
         source, volume, displacement = (
             nodes.linked(output.inputs[name]) if output else None for name in ("Surface", "Volume", "Displacement")
         )
@@ -179,7 +181,7 @@ class MaterialJob:
         if warned and displacement:
             self._problems.setdefault(displacement.key, warned[0])
         problems = {**self._graph.not_understood, **self._height_graph.not_understood, **self._problems}
-        self.coverage = coverage_of([s for s in (source, volume, displacement) if s], problems)
+        self.coverage = coverage_of([s for s in (source, volume, displacement) if s], problems, material)
 
     def _bump_by(self, displacement):
         """Bends the surface's own normal."""
@@ -268,7 +270,7 @@ class MaterialJob:
         self._warn(what, instead)
 
     def _warn(self, what, instead=""):
-        self._report.warn(f'material "{self._name}"', what, instead)
+        self._report.warn(f'material "{self._name}"', nodes.original_names(self._material, what), instead)
 
     def _extend(self, name, value):
         self._writer.extend(self.json, name, value)

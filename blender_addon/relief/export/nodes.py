@@ -3,6 +3,7 @@
 
 import contextlib
 import math
+import re
 import sys
 import threading
 from dataclasses import dataclass
@@ -44,6 +45,10 @@ def active_output(tree, idname):
 _DEEPEST = 30000
 
 _tables = None
+_inlined = None
+
+#: Nodes of shader trees that are read as they stand, though their names do not begin as those of shaders do.
+_READ_AS_THEY_STAND = {"NodeFrame", "NodeReroute", "NodeGroupInput", "NodeGroupOutput", "GeometryNodeInputSceneTime"}
 
 #: Held while trees are read: a preview or the viewport may be exported while a picture is.
 _one_reader = threading.RLock()
@@ -51,19 +56,56 @@ _one_reader = threading.RLock()
 
 @contextlib.contextmanager
 def reading():
-    """While no tree changes: links are looked up in tables, where Blender goes through all of a tree, and long chains are
-    followed to their end."""
-    global _tables
+    """While no tree changes: links are looked up in tables, where Blender goes through all of a tree, long chains are
+    followed to their end, and trees that tree_of makes stay."""
+    global _tables, _inlined
     with _one_reader:
-        before, deepest = _tables, sys.getrecursionlimit()
-        _tables = {}
+        before, deepest = (_tables, _inlined), sys.getrecursionlimit()
+        _tables, _inlined = {}, {}
         if sys.version_info >= (3, 11):  # before, each frame takes of the thread's stack
             sys.setrecursionlimit(max(deepest, _DEEPEST))
         try:
             yield
         finally:
-            _tables = before
+            _tables, _inlined = before
             sys.setrecursionlimit(deepest)
+
+
+def tree_of(owner):
+    """The nodes of a material, world or light as Cycles is given them; within `reading` alone.
+
+    Since 5.0 trees may repeat parts of themselves, choose between them by menus, and hand them around in bundles and
+    closures. Blender makes a plain tree of such a one, in which names begin with numbers: see original_name.
+    """
+    if not _is_inlined(owner):
+        return owner.node_tree
+    key = owner.as_pointer()
+    if key not in _inlined:
+        _inlined[key] = owner.inline_shader_nodes()  # which owns the tree
+    return _inlined[key].node_tree
+
+
+def _is_inlined(owner):
+    return hasattr(owner, "inline_shader_nodes") and _has_to_be_inlined(owner.node_tree, set())
+
+
+def _has_to_be_inlined(tree, seen):
+    if tree is None or tree.as_pointer() in seen:
+        return False
+    seen.add(tree.as_pointer())
+    for node in tree.nodes:
+        if not node.bl_idname.startswith("ShaderNode") and node.bl_idname not in _READ_AS_THEY_STAND:
+            return True
+        if node.bl_idname == "ShaderNodeGroup" and _has_to_be_inlined(node.node_tree, seen):
+            return True
+    return False
+
+
+def original_names(owner, text):
+    """A text about nodes of tree_of, or one's name, with the names that they have in the owner's own tree."""
+    if owner is None or not _is_inlined(owner):
+        return text
+    return re.sub(r'(^|node ")\d+_', r"\1", text)
 
 
 def _link(socket):

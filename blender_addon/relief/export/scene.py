@@ -204,7 +204,7 @@ class SceneExporter:
         self._motion = motion
         self._stored = stored if stored is not None else StoredMeshes()
         self._by_shape = {}
-        self._images = ImageExporter(self.writer, self._scene.frame_current)
+        self._images = ImageExporter(self.writer, self._scene)
         view_layer = (depsgraph.view_layer, depsgraph.scene)
         self._materials = MaterialExporter(self.writer, self._images, self._scene.relief, report, lambda: view_layer)
 

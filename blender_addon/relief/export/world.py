@@ -77,12 +77,16 @@ def _environment(world, eye, writer, images, warn):
     """RELIEF_environment of a world, but for what says who sees it."""
     if not world.use_nodes:
         return _even(nodes.finite(tuple(world.color), "its colour", warn))
-    output = nodes.active_output(world.node_tree, "ShaderNodeOutputWorld")
-    source, volume = (nodes.linked(output.inputs[name]) if output else None for name in ("Surface", "Volume"))
-    environment = _surroundings(source, eye, writer, images, warn)
-    if volume is not None:
-        with nodes.reading():
-            _add_medium(environment, volume, writer, images, warn)
+
+    def warn_of_own(what, instead=""):
+        warn(nodes.original_names(world, what), instead)
+
+    with nodes.reading():
+        output = nodes.active_output(nodes.tree_of(world), "ShaderNodeOutputWorld")
+        source, volume = (nodes.linked(output.inputs[name]) if output else None for name in ("Surface", "Volume"))
+        environment = _surroundings(source, eye, writer, images, warn_of_own)
+        if volume is not None:
+            _add_medium(environment, volume, writer, images, warn_of_own)
     return environment
 
 
@@ -102,10 +106,9 @@ def _surroundings(source, eye, writer, images, warn):
         return {"color": [0.0, 0.0, 0.0]}
     seen = _Surroundings(eye, writer, images, warn, is_camera=False)
     backdrop = None
-    with nodes.reading():
-        environment = seen.read(source)
-        if seen.asks_for_camera:
-            backdrop = _Surroundings(eye, writer, images, lambda *_: None, is_camera=True).read(source)
+    environment = seen.read(source)
+    if seen.asks_for_camera:
+        backdrop = _Surroundings(eye, writer, images, lambda *_: None, is_camera=True).read(source)
     if backdrop == {"color": [0.0, 0.0, 0.0]}:
         environment["visibleToCamera"] = False
     elif backdrop is not None and (backdrop != environment or "graph" in backdrop):
@@ -195,6 +198,7 @@ class WorldGraph(GraphWriter):
             lambda node: image_options(node, writer, images, warn),
             lambda node: ies_uri(node, writer),
             warn,
+            moment=images.moment,
         )
         self._eye = eye
 
