@@ -527,6 +527,40 @@ void Accel::intersect(EmbreeContext& context, RTCRayHit& ray) const
   to_triangle(object, &ray.hit.primID, &ray.hit.u, &ray.hit.v);
 }
 
+/// Context of a query that meets only what is wanted: Embree's part first.
+struct Accel::SelectingContext {
+  EmbreeContext embree;
+  Wanted wanted;
+};
+
+/// Hits on what is not wanted do not count: something wanted may lie at the same distance.
+void Accel::selecting_filter(const RTCFilterFunctionNArguments* arguments)
+{
+  const Wanted& wanted = reinterpret_cast<const SelectingContext*>(arguments->context)->wanted;
+  for (unsigned i = 0; i < arguments->N; ++i) {
+    if (arguments->valid[i] != -1) continue;
+    RTCRayHit met;
+    met.hit = rtcGetHitFromHitN(arguments->hit, arguments->N, i);
+    if (!wanted.asks(wanted.asked, met_object(met))) arguments->valid[i] = 0;
+  }
+}
+
+unsigned Accel::intersect_wanted(const EmbreeContext& context, RTCRayHit& ray, const Wanted& wanted) const
+{
+  SelectingContext selecting{context, wanted};
+  embree_context_filter(selecting.embree, selecting_filter);
+  const float t_max = ray.ray.tfar;
+  for (;;) {
+    ray.ray.tfar = t_max;
+    ray.hit.geomID = ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+    intersect(selecting.embree, ray);
+    const unsigned object = met_object(ray);
+    if (object == RTC_INVALID_GEOMETRY_ID || wanted.asks(wanted.asked, object)) return object;
+    // Displaced geometry asks no filter. Embree would give the same hit again: a ray that starts at one meets it.
+    ray.ray.tnear = t_min_behind(ray.ray.tfar);
+  }
+}
+
 namespace {
 
 /// Context of a query that gathers hits: Embree's part first.

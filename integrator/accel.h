@@ -79,18 +79,11 @@ class Accel {
   /// @param ray        as above, its hit need not be set; its tnear is that of the last search
   /// @return           number of the object; RTC_INVALID_GEOMETRY_ID: none is met
   template <typename IsWanted>
-  unsigned intersect_only(EmbreeContext& context, RTCRayHit& ray, IsWanted&& is_wanted) const
+  unsigned intersect_only(const EmbreeContext& context, RTCRayHit& ray, const IsWanted& is_wanted) const
   {
-    const float t_max = ray.ray.tfar;
-    for (;;) {
-      ray.ray.tfar = t_max;
-      ray.hit.geomID = ray.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-      intersect(context, ray);
-      const unsigned object = met_object(ray);
-      if (object == RTC_INVALID_GEOMETRY_ID || is_wanted(object)) return object;
-      // Embree would give the same hit again: a ray that starts at one meets it.
-      ray.ray.tnear = t_min_behind(ray.ray.tfar);
-    }
+    return intersect_wanted(context, ray, {&is_wanted, [](const void* asked, unsigned object) -> bool {
+                                             return (*static_cast<const IsWanted*>(asked))(object);
+                                           }});
   }
   /// All hits on one object, on whichever of its parts, in no order.
   /// @param ray   as above
@@ -122,6 +115,14 @@ class Accel {
   const KeptTrees::Tally& kept() const { return kept_; }  ///< of the scenes before
 
  private:
+  /// A callable that tells whether an object is asked for, without its type.
+  struct Wanted {
+    const void* asked;
+    bool (*asks)(const void* asked, unsigned object);
+  };
+  struct SelectingContext;
+  unsigned intersect_wanted(const EmbreeContext& context, RTCRayHit& ray, const Wanted& wanted) const;
+  static void selecting_filter(const RTCFilterFunctionNArguments* arguments);
   void trace(EmbreeContext& context, RTCRayHit& ray) const;
   static void intersect_far(const RayTarget& target,
                             RTCScene scene,

@@ -225,6 +225,22 @@ TEST(Subsurface, PathsKnowNoOtherObject)
   EXPECT_NEAR(a.mean(), b.mean(), 1e-3 * a.mean());
 }
 
+/// A copy that was left in place of an object: files of real life have some. Where the copy's hits stood before the object's, the
+/// object had none, and was black.
+TEST(Subsurface, PathsKnowNoCopyOnTheObject)
+{
+  for (const char* method : {"random-walk", "christensen-burley"}) {
+    const Scene alone =
+        cube_of({{"type", "subsurface"}, {"method", method}, {"color", {0.7, 0.7, 0.7}}, {"radius", {0.4, 0.4, 0.4}}});
+    Scene doubled = alone;
+    Instance copy = doubled.instances.front();
+    copy.object_index = -1;
+    doubled.instances.push_back(copy);
+    const Rendered a = render_scene(alone, options_for(alone)), b = render_scene(doubled, options_for(doubled));
+    EXPECT_NEAR(a.mean(), b.mean(), 1e-3 * a.mean()) << method;
+  }
+}
+
 /// However many there are: walks used to be given up behind the 64th.
 TEST(Subsurface, PathsPassAnyNumberOfObjects)
 {
