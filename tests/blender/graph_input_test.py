@@ -526,6 +526,16 @@ def test_ambient_occlusion():
     assert_agrees(scene, samples=16)
 
 
+def test_ambient_occlusion_as_far_as_the_world_says():
+    """A distance of 0 is none: files of before 2.80, whose nodes had none to set, are read so."""
+    scene, node = _occluded_scene()
+    node.inputs["Distance"].default_value = 0.0
+    assert_agrees(scene, samples=16)
+    scene.world = bpy.data.worlds.new("World")
+    scene.world.light_settings.distance = 1.2
+    assert_agrees(scene, samples=16)
+
+
 def test_ambient_occlusion_of_one_object_inside():
     scene, node = _occluded_scene(only_local=True, inside=True, samples=5)
     node.inputs["Distance"].default_value = 0.8

@@ -29,6 +29,7 @@ class GraphWriter:
     @param  material_index  Pass Index of the material
     @param  view_layer      gives the things whose properties are the view layer's attributes, the first one first
     @param  moment          (frame, seconds) that the scene is at
+    @param  occlusion_distance  in metres, of Ambient Occlusion nodes whose own is 0
     nodes          JSON of the nodes so far
     uses_generated whether meshes need _GENERATED
     uses_tangents  whether tangents along the uv map that is active in renders are read
@@ -48,6 +49,7 @@ class GraphWriter:
         material_index=0,
         view_layer=tuple,
         moment=(0.0, 0.0),
+        occlusion_distance=0.0,
     ):
         self.coordinate_set = coordinate_set
         self.texture = texture
@@ -59,6 +61,7 @@ class GraphWriter:
         self.material_index = material_index
         self.view_layer = view_layer
         self.moment = moment
+        self.occlusion_distance = occlusion_distance
         self.attributes = []
         self.values = []
         self.own_normal = None

@@ -234,6 +234,8 @@ def _wireframe(g, source):
 def _ambient_occlusion(g, source):
     node, groups = source.node, source.groups
     inputs = g.inputs(node, groups, {"Color": "color", "Distance": "distance"})
+    if g.constant(node.inputs["Distance"], groups) == 0.0:
+        inputs["distance"] = g.occlusion_distance
     normal = g.normal(node.inputs["Normal"], groups)
     if normal is not None:
         inputs["normal"] = normal

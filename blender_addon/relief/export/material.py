@@ -11,7 +11,7 @@ from .graph import GraphWriter, bump_of_displacement
 from .light import set_emission
 from .mesh import Wanted
 from .not_understood import NotUnderstood
-from .settings import filters_glossy
+from .settings import filters_glossy, occlusion_distance
 from .surface import TRANSPARENT, ClosureWriter, Inside, Surface, plain_surface
 from .texture import Input, TextureReader, ies_uri, image_options
 from .volume import VolumeWriter
@@ -146,6 +146,7 @@ class MaterialJob:
                 material_index=material.pass_index if material else 0,
                 view_layer=view_layer,
                 moment=images.moment,
+                occlusion_distance=occlusion_distance(settings.id_data),
             )
 
         self._graph, self._height_graph = new_graph(), new_graph()

@@ -125,6 +125,11 @@ def filters_glossy(scene):
     return (scene.relief.filter_glossy if cycles is None else cycles.blur_glossy) > 0
 
 
+def occlusion_distance(scene):
+    """How far Ambient Occlusion nodes look whose own distance is 0, in metres: as far as the world says, without one any way."""
+    return scene.world.light_settings.distance if scene.world is not None else 1e30
+
+
 def warn_unread_settings(scene, warn):
     """Warns about those of Cycles' settings that change the picture, but not relief's.
 
