@@ -376,18 +376,24 @@ def test_missing_files_are_magenta_in_every_use():
 
 
 def test_an_image_node_without_image_is_magenta():
-    """As a colour, as a number, and by its channels and alpha."""
+    """As a colour, as a number, by its channels and alpha, and in a graph."""
     scene = new_scene()
-    for i, output in enumerate(("Color", "Red", "Green", "Alpha")):
+    for i, output in enumerate(("Color", "Red", "Green", "Alpha", "Varied Color", "Varied Alpha")):
         material, tree, node = new_material(f"material {i}")
         image = tree.nodes.new("ShaderNodeTexImage")
-        source = image.outputs["Alpha" if output == "Alpha" else "Color"]
+        source = image.outputs["Alpha" if "Alpha" in output else "Color"]
+        if "Varied" in output:
+            noise, product = tree.nodes.new("ShaderNodeTexNoise"), tree.nodes.new("ShaderNodeVectorMath")
+            product.operation = "MULTIPLY"
+            tree.links.new(noise.outputs["Fac"], product.inputs[0])
+            tree.links.new(source, product.inputs[1])
+            source = product.outputs[0]
         if output in {"Red", "Green"}:
             separate = tree.nodes.new("ShaderNodeSeparateColor")
             tree.links.new(source, separate.inputs["Color"])
             source = separate.outputs[output]
         tree.links.new(source, node.inputs["Color"])
-        add_plane(1.8, material, (2 * i - 3, 0, 0))
+        add_plane(1.8, material, (2 * (i % 3) - 2, 2 * (i // 3) - 1, 0))
     add_light("SUN", energy=3, angle=0)
     add_camera((0, 0, 9))
     assert_agrees(scene, block=4)

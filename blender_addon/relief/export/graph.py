@@ -9,7 +9,7 @@ from json import dumps
 
 from .. import compat
 from . import color_space, nodes
-from .graph_inputs import OUTPUTS, mesh_attribute, tangent_set, transformed_normal
+from .graph_inputs import OUTPUTS, image_of_nothing, mesh_attribute, tangent_set, transformed_normal
 from .image import is_missing
 from .not_understood import NotUnderstood
 
@@ -143,6 +143,8 @@ class GraphWriter:
             return self.normal(node.inputs["Normal"], source.groups) or self.geometry_normal()
         if node.bl_idname == "ShaderNodeNewGeometry" and source.socket.identifier == "Normal":
             return self.own_normal or self.geometry_normal()
+        if node.bl_idname in {"ShaderNodeTexImage", "ShaderNodeTexEnvironment"} and node.image is None:
+            return image_of_nothing(self, source)
         give = OUTPUTS.get(node.bl_idname)
         write, names = _NODES.get(node.bl_idname, (None, {}))
         name = names.get(source.socket.identifier, names.get(source.socket.name))
@@ -318,9 +320,6 @@ def _white_noise(g, node, groups):
 
 
 def _image(g, node, groups):
-    if node.image is None:
-        magenta = {"red": 1.0, "green": 0.0, "blue": 1.0}
-        return g.add("combine-color", magenta)
     options = g.texture(node)
     if options is None:
         raise NotUnderstood(f'node "{node.name}": an image without file')
@@ -340,8 +339,6 @@ def _image(g, node, groups):
 
 def _environment(g, node, groups):
     """An image by direction, which a surface takes from its position unless told."""
-    if node.image is None:
-        return g.add("combine-color", {"red": 1.0, "green": 0.0, "blue": 1.0})
     options = g.texture(node)
     if options is None:
         raise NotUnderstood(f'node "{node.name}": an image without file')

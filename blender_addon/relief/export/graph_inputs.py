@@ -8,6 +8,7 @@ import bpy
 
 from .. import compat
 from . import attributes, instance_values, nodes
+from .image import MISSING
 from .not_understood import not_understood
 
 
@@ -20,6 +21,11 @@ def _constant(g, value):
     if isinstance(value, (tuple, list)):
         return _output(g.add("combine", dict(zip("xyz", (float(v) for v in value)))), "vector")
     return _output(g.add("math", {"a": float(value), "b": 0.0}, operation="add"), "value")
+
+
+def image_of_nothing(g, source):
+    """What an image node without an image gives."""
+    return _constant(g, 1.0 if source.socket.name == "Alpha" else MISSING)
 
 
 def mesh_attribute(g, kind, name, output):
