@@ -469,7 +469,9 @@ DisplacedPoint PointTiles::resolve(const InstanceView& placement, std::uint32_t 
       return normalize(transform_normal(placement.object_from_world, as_normal(to_float(N[k]))));
     };
     const auto weight = [&](int k) { return static_cast<float>(micro.weight[k]); };
-    out.lift = triangle_lift(weight(0), weight(1), weight(2), edge(1), edge(2), N_world(0), N_world(1), N_world(2));
+    const Vec3f N0 = N_world(0), N1 = N_world(1), N2 = N_world(2);
+    const LiftHeights<float> lift = triangle_lift(weight(0), weight(1), weight(2), edge(1), edge(2), N0, N1, N2);
+    out.lift = {weight(0) * N0 + weight(1) * N1 + weight(2) * N2, lift.front, lift.back};
   }
   // Rays that leave from beside a side of the triangle start clear of those around it, as Tessellation::leave has it.
   const LeavingErrors errors = leaving_errors(placement, out.P, out.Ng);

@@ -168,10 +168,12 @@ Pilot pilot_run(const SceneContext& context,
                 PhotonSources sources,
                 std::uint32_t num_photons,
                 double num_pixels,
+                std::uint64_t seed,
                 const std::atomic<bool>& stop)
 {
   const RenderSettings& settings = options.settings;
   KernelGlobals g = of_render;
+  g.seed = seed;
   Film film = pilot_film(settings, num_pixels, g);
   const StageTable& stages = stage_table_select();
   const Media media(context);
@@ -411,8 +413,8 @@ PhotonChoice photon_choice_make(const SceneContext& context,
   const double whole = std::clamp(num_pixels * settings.samples / 128, kLeastPilotPaths, 32768.0);
   PhotonSources pilots = choice.sources;
   pilots.factors = pilot_factors(context, pilots, settings);
-  const auto run = [&](const PhotonSources& sources, double paths) {
-    return pilot_run(context, options, g, sources, static_cast<std::uint32_t>(paths), paths / kPilotSamples, stop);
+  const auto run = [&](const PhotonSources& sources, double paths, std::uint64_t seed) {
+    return pilot_run(context, options, g, sources, static_cast<std::uint32_t>(paths), paths / kPilotSamples, seed, stop);
   };
   // As many photons as a small picture has show what there is.
   constexpr double kFewest = 1 << 14;
@@ -430,7 +432,7 @@ PhotonChoice photon_choice_make(const SceneContext& context,
   for (const double part : {0.25, 1.0}) {
     const double paths = part * whole;
     if (paths < kLeastPilotPaths) continue;
-    pilot = run(pilots, paths);
+    pilot = run(pilots, paths, g.seed);
     const bool shows = pilot.stored > 0 && pilot.caustic_error > 0;
     if (!shows && part < 1) continue;
     if (!shows) {
@@ -447,8 +449,17 @@ PhotonChoice photon_choice_make(const SceneContext& context,
     return choice;
   }
   // With photons a path that comes by chance to a bright caustic has noise of its own.
-  const Pilot shown = run(choice.sources, whole);
-  compare(std::max(shown.seen_error, pilot.seen_error));
+  const Pilot shown = run(choice.sources, whole, g.seed);
+  const double seen_error = std::max(shown.seen_error, pilot.seen_error);
+  compare(seen_error);
+  // A single photon may have told that: where it is close, another pilot has to say so, too.
+  constexpr double kClear = 2.5;
+  if (choice.error_ratio > choice.cost_ratio && choice.error_ratio < kClear * choice.cost_ratio) {
+    const Pilot second = run(pilots, whole, ~g.seed);
+    pilot.photon_error = 0.5 * (pilot.photon_error + second.photon_error);
+    without = pilot.seen_error + std::sqrt(pilot.caustic_error * second.caustic_error);
+    compare(seen_error);
+  }
   if (choice.error_ratio <= choice.cost_ratio) {
     leave_to_paths("left to paths: photons would " + figures(""));
     return choice;

@@ -222,13 +222,12 @@ class TangentBuilder {
 
   Vec4f tangent_of(std::uint32_t vertex, Handedness side) const
   {
-    const bool negative = side == Handedness::kNegative;
-    const Vec3f n = as_vector(N_[vertex]);
-    Vec3f t = project_unit(sums_[negative ? 1 : 0][first_equal_[vertex]], n);
-    if (is_zero(t)) {
-      t = frame_from_normal(n).s;  // no triangle knows better; any direction in the plane
-    }
-    return {t.x, t.y, t.z, negative ? -1.0f : 1.0f};
+    const std::uint32_t first = first_equal_[vertex];
+    // Of triangles without area in uv that is what neighbours have; or else what MikkTSpace leaves there, as far as it is in the plane.
+    const bool positive = side == Handedness::kPositive || (side == Handedness::kUnknown && !is_zero(sums_[0][first]));
+    const Vec3f sum = sums_[positive ? 0 : 1][first];
+    const Vec3f t = project_unit(is_zero(sum) ? Vec3f{1, 0, 0} : sum, as_vector(N_[vertex]));
+    return {t.x, t.y, t.z, positive ? 1.0f : -1.0f};
   }
 
   Mesh& mesh_;

@@ -86,7 +86,6 @@ RELIEF_KERNEL float curve_radius(const MeshView& mesh, const InstanceView& insta
 
   SurfaceHit hit;
   hit.P = P_ray;
-  hit.P_lift = {};
   const Vec3f size = abs(P_ray);
   const auto abs_transform = [](const Affine3& by, Vec3f d) {
     return abs(by.x) * d.x + abs(by.y) * d.y + abs(by.z) * d.z;

@@ -5,6 +5,7 @@
 
 #include "kernel/math/rounding.h"
 #include "kernel/shape/mesh_view.h"
+#include "kernel/shape/triangle_lift.h"
 
 namespace relief {
 
@@ -17,7 +18,7 @@ struct SurfaceHit {
   Vec2f uv[2];    ///< texture coordinates; (0, 0) where absent
   Vec4f color{1, 1, 1, 1};
   float area_ratio[2] = {0, 0};  ///< √(uv area / world area) of the triangle: uv units a metre, for texture footprints
-  Vec3f P_lift;   ///< vector from P to the smooth surface that Ns suggests, see triangle_lift; 0 for flat meshes
+  TriangleLift lift{};  ///< see triangle_lift; 0 for flat meshes
   Vec3f leave{};  ///< how rays' origins are moved to the front side, metres; 0: along Ng, by P_error
   Vec3f clear{};  ///< how they are moved first, along the triangle: see triangle_clearance
 };
@@ -82,22 +83,6 @@ RELIEF_KERNEL void surface_hit_density(const MeshView& mesh, TriangleIndices tri
   }
 }
 
-/// Vector from a point of a triangle to a smooth surface through its vertices. It is projected onto the plane of each vertex and its
-/// normal; the surface is the barycentric mean of the projections. Only the outward part is used: on concave patches the point itself
-/// is already outside.
-/// @param w, u, v       barycentric weights of the vertices
-/// @param edge1, edge2  from vertex 0 to vertices 1 and 2
-/// @param n0, n1, n2    unit
-/// @source Hanika 2021, "Hacking the Shadow Terminator"
-RELIEF_KERNEL Vec3f triangle_lift(float w, float u, float v, Vec3f edge1, Vec3f edge2, Vec3f n0, Vec3f n1, Vec3f n2)
-{
-  const Vec3f to0 = -(u * edge1 + v * edge2);
-  const float d0 = max(0.0f, dot(to0, n0));
-  const float d1 = max(0.0f, dot(to0 + edge1, n1));
-  const float d2 = max(0.0f, dot(to0 + edge2, n2));
-  return w * d0 * n0 + u * d1 * n1 + v * d2 * n2;
-}
-
 /// Evaluates the triangle's attributes at a hit.
 /// @param bary_u, bary_v  barycentric weights of vertices 1 and 2
 /// @source position error: pbrt-v4 §6.8.5 and Eq. 6.24
@@ -139,7 +124,6 @@ RELIEF_KERNEL SurfaceHit surface_hit_make(const MeshView& mesh,
   hit.clear = triangle_clearance({w0, bary_u, bary_v}, edge1, edge2, double_area, hit.Ng, hit.P_error);
 
   hit.Ns = hit.Ng;
-  hit.P_lift = {};
   if (mesh.N != nullptr) {
     const Vec3f n0 = normalize(transform_normal(instance.object_from_world, mesh_N(mesh, tri.v0)));
     const Vec3f n1 = normalize(transform_normal(instance.object_from_world, mesh_N(mesh, tri.v1)));
@@ -148,7 +132,8 @@ RELIEF_KERNEL SurfaceHit surface_hit_make(const MeshView& mesh,
     const float n_length = length(n);
     // Opposite vertex normals can cancel; then the flat normal is the only defensible one.
     if (n_length > 1e-6f) hit.Ns = n / n_length;
-    hit.P_lift = triangle_lift(w0, bary_u, bary_v, edge1, edge2, n0, n1, n2);
+    const LiftHeights<float> lift = triangle_lift(w0, bary_u, bary_v, edge1, edge2, n0, n1, n2);
+    hit.lift = {n, lift.front, lift.back};
   }
 
   surface_hit_interpolate(mesh, tri, bary_u, bary_v, &hit);
@@ -197,7 +182,7 @@ struct DisplacedSurface {
   Vec3f Ng;     ///< unit geometric normal, on the side of the displacement normal
   Vec3f Ns;     ///< unit shading normal, likewise
   Vec3f leave;  ///< see SurfaceHit::leave
-  Vec3f lift{};  ///< see SurfaceHit::P_lift; world space
+  TriangleLift lift{};  ///< world space
 };
 
 /// As surface_hit_make, on the displaced surface over the triangle. Texture coordinates and colours are the triangle's.
@@ -216,7 +201,7 @@ RELIEF_KERNEL SurfaceHit surface_hit_displaced(const MeshView& mesh,
   hit.P_error = displaced_point_error(instance, at.P, hit.P).world + displaced_tracer_error(mesh, instance, tri);
   hit.Ng = normalize(transform_normal(inverse, as_normal(at.Ng)));
   hit.Ns = normalize(transform_normal(inverse, as_normal(at.Ns)));
-  hit.P_lift = at.lift;
+  hit.lift = at.lift;
   hit.leave = transform_vector(m, at.leave);
   surface_hit_interpolate(mesh, tri, bary_u, bary_v, &hit);
   const Vec3f p0 = mesh.P[tri.v0];
@@ -279,16 +264,6 @@ RELIEF_KERNEL Vec3f surface_hit_origin(const SurfaceHit& hit, Vec3f P, bool fron
 {
   if (!is_zero(hit.leave)) return move_ray_origin(P, front ? hit.leave : -hit.leave);
   return offset_ray_origin(P + hit.clear, hit.P_error, front ? hit.Ng : -hit.Ng);
-}
-
-/// How much of the lift onto the smooth surface a ray gets: none for directions well above the facet (their shadows are
-/// already right), all for those below it, where a facet would shadow itself along the terminator.
-/// @param cos_g  cosine between the ray and the facet's normal on the side it leaves
-RELIEF_KERNEL float terminator_lift_weight(float cos_g)
-{
-  // 0.1 is the sine of the largest angle between facet and smooth normal on meshes that look smooth (about 6°).
-  constexpr float kLiftedBelow = 0.1f;
-  return clamp(2.0f * (1.0f - cos_g / kLiftedBelow), 0.0f, 1.0f);
 }
 
 }  // namespace relief

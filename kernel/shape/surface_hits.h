@@ -126,20 +126,23 @@ struct TriangleLanes {
   const Vec3x8 Ng = normal_area / double_area;
   const Vec3x8 clear = triangle_clearance({w0, bary_u, bary_v}, edge1, edge2, double_area, Ng, P_error);
 
-  Vec3x8 Ns = Ng, P_lift{};
+  Vec3x8 Ns = Ng, lift_N{};
+  LiftHeights<F8> lift{};
   if (mask_of(at.has_normals) != 0) {
     const Vec3x8 n0 = normalize(transform_normal(inverse, n[0])), n1 = normalize(transform_normal(inverse, n[1])),
                  n2 = normalize(transform_normal(inverse, n[2]));
     const Vec3x8 mean = w0 * n0 + bary_u * n1 + bary_v * n2;
     const F8 mean_length = length(mean);
     Ns = select(at.has_normals & (mean_length > 1e-6f), mean / mean_length, Ng);
-    const Vec3x8 to0 = -(bary_u * edge1 + bary_v * edge2);
-    const F8 d0 = max(splat8(0.0f), dot(to0, n0)), d1 = max(splat8(0.0f), dot(to0 + edge1, n1)),
-             d2 = max(splat8(0.0f), dot(to0 + edge2, n2));
-    P_lift = select(at.has_normals, w0 * d0 * n0 + bary_u * d1 * n1 + bary_v * d2 * n2, P_lift);
+    // Of meshes without normals zeros were loaded for these, which are NaN by now.
+    const LiftHeights<F8> of_smooth = triangle_lift(w0, bary_u, bary_v, edge1, edge2, n0, n1, n2);
+    const F8 none{};
+    lift_N = select(at.has_normals, mean, lift_N);
+    lift.front = at.has_normals ? of_smooth.front : none;
+    lift.back = at.has_normals ? of_smooth.back : none;
   }
 
-  alignas(32) float out[19][8];
+  alignas(32) float out[21][8];
   const auto give = [](float(*columns)[8], const Vec3x8& v) {
     store8(columns[0], v.x);
     store8(columns[1], v.y);
@@ -149,9 +152,11 @@ struct TriangleLanes {
   give(out + 3, P_error);
   give(out + 6, Ng);
   give(out + 9, Ns);
-  give(out + 12, P_lift);
+  give(out + 12, lift_N);
   give(out + 15, clear);
   store8(out[18], double_area);
+  store8(out[19], lift.front);
+  store8(out[20], lift.back);
   for (int k = 0; k < num_hits; ++k) {
     const auto number = [&](int first) { return Vec3f{out[first][k], out[first + 1][k], out[first + 2][k]}; };
     SurfaceHit& hit = *new (hits[k]) SurfaceHit;
@@ -159,7 +164,7 @@ struct TriangleLanes {
     hit.P_error = number(3);
     hit.Ng = number(6);
     hit.Ns = number(9);
-    hit.P_lift = number(12);
+    hit.lift = {number(12), out[19][k], out[20][k]};
     hit.clear = number(15);
     surface_hit_interpolate(*q.mesh[k], at.tri[k], q.bary_u[k], q.bary_v[k], &hit);
     surface_hit_density(*q.mesh[k], at.tri[k], out[18][k], &hit);

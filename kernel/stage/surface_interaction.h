@@ -543,19 +543,25 @@ RELIEF_KERNEL bool path_pass_through(const KernelGlobals& g, PathState& state, s
   return passed_so_far <= most + 1u;
 }
 
-/// Origin of a ray that leaves the surface.
+/// Origin of a ray that goes on from the surface: where closures scatter it is the true surface that it leaves.
 /// @param wi  unit, its direction
 RELIEF_KERNEL Vec3f surface_ray_origin(const SurfaceInteraction& at, Vec3f wi)
 {
   if (__builtin_expect((at.instance->flags & kCurves) != 0, 0)) {
     return surface_hit_origin(at.hit, at.hit.P, dot(wi, at.hit.leave) > 0.0f);
   }
-  // Above the surface the ray starts on the lifted side, below it on the other. Closures send light by the true surface; what
-  // only the shading normal sees of lamps is lifted above a facet, unless it may have come through.
-  const bool above_Ns = dot(wi, at.side.Ns) > 0.0f;
-  const bool above = at.material->has_closures ? dot(wi, at.side.Ng) > 0.0f || (above_Ns && !at.transmits) : above_Ns;
-  Vec3f P = at.hit.P;
-  if (above && at.side.front) P += at.hit.P_lift * terminator_lift_weight(dot(wi, at.side.Ng));
+  const bool above = dot(wi, at.material->has_closures ? at.side.Ng : at.side.Ns) > 0.0f;
+  return surface_hit_origin(at.hit, at.hit.P, above == at.side.front);
+}
+
+/// Origin of a ray that asks for a light: it leaves the smooth surface, on the side that its normal tells.
+/// @param wi  as above
+RELIEF_KERNEL Vec3f surface_light_origin(const SurfaceInteraction& at, Vec3f wi)
+{
+  if (__builtin_expect((at.instance->flags & kCurves) != 0, 0)) return surface_ray_origin(at, wi);
+  const bool above = dot(wi, at.side.Ns) > 0.0f;
+  const float side = above ? 1.0f : -1.0f;
+  const Vec3f P = at.hit.P + terminator_lift(at.hit.lift, wi, side * at.side.Ng, side * at.side.Ns);
   return surface_hit_origin(at.hit, P, above == at.side.front);
 }
 

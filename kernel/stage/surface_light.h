@@ -37,6 +37,10 @@ RELIEF_KERNEL void shade_surface_lit(const KernelGlobals& g,
   const int bounce = path_bounces(state.bounces[path], BounceKind::kAll);
   const LightSample& light = answer.sample;
   const Light* const emitter = answer.emitter;
+  // Cycles asks no even surroundings: paths alone find them, which go nowhere below the true surface.
+  const bool is_even_sky = emitter == nullptr && !g.lights.environment.has_map;
+  const bool is_curve = (at.instance->flags & kCurves) != 0;
+  if (is_even_sky && !is_curve && (dot(light.wi, at.side.Ng) > 0.0f) != (wi.z > 0.0f)) return;
   const auto transmits = [&] { return (wi.z < 0.0f) != (dot(at.side.frame.n, path_direction(state, path)) > 0.0f); };
   if constexpr ((kFeatures & kFeatureMixture) == 0) {
     const std::uint32_t without = path_does_without(g, state.flags[path]);
@@ -69,7 +73,7 @@ RELIEF_KERNEL void shade_surface_lit(const KernelGlobals& g,
   const Vec3f gain = event.throughput * bsdf.f * answer.radiance * (cos_i * weight / light.pdf);
   if (is_zero(gain)) return;
 
-  const Vec3f O = surface_ray_origin(at, light.wi);
+  const Vec3f O = is_even_sky ? surface_ray_origin(at, light.wi) : surface_light_origin(at, light.wi);
   Vec3f D;
   float t_max = 0;
   shadow_ray_aim(light, emitter, P, O, D, t_max);

@@ -7,6 +7,7 @@
 #include "kernel/assert.h"
 #include "kernel/light/light_receiver.h"
 #include "kernel/math/vec.h"
+#include "kernel/shape/triangle_lift.h"
 #include "kernel/state/facet_state.h"
 #include "kernel/state/light_pass_state.h"
 #include "kernel/state/medium_state.h"

@@ -55,6 +55,47 @@ def test_split_normals():
     assert_agrees(scene)
 
 
+def _clay():
+    """Without gloss, but of closures: what is plainly diffuse has its normals turned towards the camera at silhouettes."""
+    material, _, node = new_material("clay", "ShaderNodeBsdfPrincipled", Base_Color=(0.8, 0.4, 0.2, 1), Roughness=1.0)
+    node.inputs["Specular IOR Level" if "Specular IOR Level" in node.inputs else "Specular"].default_value = 0
+    return material
+
+
+def _coarse_tube(make_material, thickness):
+    """An open cylinder of 20 smooth sides, in a dim room beside a lamp that stands over its rim."""
+    scene = new_scene(96, 72)
+    set_world((0.05, 0.05, 0.05))
+    bpy.ops.mesh.primitive_cylinder_add(vertices=20, radius=1, depth=2, end_fill_type="NOTHING")
+    tube = bpy.context.object
+    bpy.ops.object.shade_smooth()
+    tube.data.materials.append(make_material())
+    if thickness > 0:
+        tube.modifiers.new("thick", "SOLIDIFY").thickness = thickness
+    add_light("POINT", (-1.4, 0.7, 3), energy=150, shadow_soft_size=0.1)
+    add_camera((3, -2.4, 2.6), degrees(56, 0, 51), lens=40)
+    set_bounces(scene, 0)
+    return scene
+
+
+def test_light_over_the_rim_of_a_coarse_smooth_tube():
+    """Its inner side turns away from the lamp, its normals do not: dark teeth stood below the rim."""
+    assert_agrees(_coarse_tube(_clay, 0.1), samples=64)
+
+
+def test_light_through_a_coarse_smooth_tube():
+    """Light that comes through starts on the far side of the smooth surface."""
+
+    def paper():
+        return new_material("paper", "ShaderNodeBsdfTranslucent", Color=(0.8, 0.7, 0.5, 1))[0]
+
+    assert_agrees(_coarse_tube(paper, 0), samples=64)
+
+
+def test_light_inside_a_coarse_smooth_tube_of_normals_that_point_out():
+    assert_agrees(_coarse_tube(_clay, 0), samples=64)
+
+
 def test_modifiers_at_their_render_level():
     scene = _stage()
     bpy.ops.mesh.primitive_cube_add(size=1.6, location=(0, 0, 1))

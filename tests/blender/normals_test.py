@@ -111,6 +111,23 @@ def _mapped(kind, **inputs):
     return material, node
 
 
+def test_normal_maps_over_coordinates_without_area():
+    """Faces that were never unwrapped: tangents run along x there, and round the other way than elsewhere."""
+    scene = _scene(0)
+    _clear()
+    for i, spread in enumerate(((0, 0), (1, 0), (0, 1), (1, 1))):
+        material, tree, node = new_material(f"bent {i}", "ShaderNodeBsdfDiffuse")
+        bend = tree.nodes.new("ShaderNodeNormalMap")
+        bend.inputs["Color"].default_value = (0.8, 0.3, 0.9, 1)
+        tree.links.new(bend.outputs["Normal"], node.inputs["Normal"])
+        plane = add_plane(1.8, material, (2 * (i % 2) - 1, 2 * (i // 2) - 1, 0))
+        for corner in plane.data.uv_layers.active.data:
+            corner.uv = (corner.uv.x * spread[0], corner.uv.y * spread[1])
+    add_light("SUN", rotation=degrees(50, 0, 40), energy=3, angle=0)
+    add_camera((0, 0, 9), lens=60)
+    assert_agrees(scene, samples=64, block=4)
+
+
 def test_mirrors_of_bent_normals_in_a_furnace():
     """Coarse and fine balls, smooth and flat: what is reflected above the true surface is not lost."""
     for segments in (24, 96):

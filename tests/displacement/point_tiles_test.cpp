@@ -340,8 +340,10 @@ TEST(PointTiles, AreShadedAsADividedMesh)
                 const TriangleIndices triangle{v[0], v[1], v[2]};
                 there_alone.triangles = &triangle;
                 const SurfaceHit hit = surface_hit_make(there_alone, placed, 0, w[0], w[1]);
-                ASSERT_LT(length(at.lift - hit.P_lift), 1e-6f + 1e-4f * length(hit.P_lift)) << c.name;
-                most_lift = std::max(most_lift, length(hit.P_lift));
+                ASSERT_LT(length(at.lift.N - hit.lift.N), 1e-4f) << c.name;
+                ASSERT_NEAR(at.lift.front, hit.lift.front, 1e-6f + 1e-4f * hit.lift.front) << c.name;
+                ASSERT_NEAR(at.lift.back, hit.lift.back, 1e-6f - 1e-4f * hit.lift.back) << c.name;
+                most_lift = std::max(most_lift, hit.lift.front);
                 ASSERT_GT(dot(to_double(at.Ns), smooth), (1 - 1e-5) * length(smooth))
                     << c.name << " part " << part << " n " << lattice.n << " cell " << i << ' ' << j << ' ' << second;
               }

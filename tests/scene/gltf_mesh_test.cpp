@@ -289,6 +289,27 @@ TEST(Tangents, MirroredUvSplitVertices)
   EXPECT_NE(mesh.tangent[mesh.triangles[0].v0].w, mesh.tangent[mesh.triangles[1].v0].w);
 }
 
+// As MikkTSpace leaves them: along x, mirrored. What shares a vertex with a triangle that has area takes its.
+TEST(Tangents, OfTrianglesWithoutUvAreaRunAlongXMirrored)
+{
+  GltfBuilder b = normal_mapped_square();
+  const auto with = [&](const std::vector<float>& uv) {
+    b.json["meshes"][0]["primitives"][0]["attributes"]["TEXCOORD_0"] = b.accessor<float>(uv, "VEC2");
+    return load_glb(b).meshes.at(0);
+  };
+  const Mesh none = with({.3f, .3f, .3f, .3f, .3f, .3f, .3f, .3f});
+  for (const Vec4f tangent : none.tangent) {
+    expect_near(xyz(tangent), {1, 0, 0}, 1e-6f);
+    EXPECT_EQ(tangent.w, -1.0f);
+  }
+  // Of the second triangle all uv lie on a line.
+  const Mesh half = with({0, 1, 1, 1, 1, 0, .5f, .5f});
+  const TriangleIndices second = half.triangles.at(1);
+  int num_shared = 0;
+  for (const std::uint32_t v : {second.v0, second.v1, second.v2}) num_shared += half.tangent[v].w == 1.0f ? 1 : 0;
+  EXPECT_EQ(num_shared, 2);
+}
+
 // On a cylinder around y with u once around, ∂P/∂u is the horizontal direction across the radius at every vertex.
 TEST(Tangents, OfACylinderFollowTheCircle)
 {
