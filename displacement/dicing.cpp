@@ -1,8 +1,10 @@
 #include "displacement/dicing.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
+#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include "displacement/level_of_detail.h"
@@ -33,6 +35,11 @@ Dicing::Dicing(const MeshView& mesh,
   // However near the camera is; texels of some triangles are narrower than the mean.
   constexpr double kNarrower = 4;
   const double most_a_metre = kNarrower * kMostSegmentsATexel / texel_;
+  // Nobody traces the parts' prisms.
+  mesh_.unfolded = nullptr;
+  mesh_.walls = nullptr;
+  mesh_.num_walls = 0;
+  if (!has_long_sides(most_a_metre)) return;
   parts_ = lattices_make(
       mesh,
       [&](Vec3f a, Vec3f b) {
@@ -55,10 +62,22 @@ Dicing::Dicing(const MeshView& mesh,
   });
   mesh_.triangles = triangles_.data();
   mesh_.num_triangles = static_cast<std::uint32_t>(triangles_.size());
-  // Nobody traces the parts' prisms.
-  mesh_.unfolded = nullptr;
-  mesh_.walls = nullptr;
-  mesh_.num_walls = 0;
+}
+
+/// Whether a triangle may have to be cut. Of dense meshes none has.
+bool Dicing::has_long_sides(double most_a_metre) const
+{
+  std::atomic<bool> has{false};
+  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, mesh_.num_triangles), [&](const auto& range) {
+    for (std::uint32_t index = range.begin(); index < range.end() && !has.load(std::memory_order_relaxed); ++index) {
+      const DisplacedTriangle& tri = mesh_.triangles[index];
+      const double longest = static_cast<double>(
+          std::max({length(tri.P[1] - tri.P[0]), length(tri.P[2] - tri.P[1]), length(tri.P[0] - tri.P[2])}));
+      const double most = std::min(seen_.most_pixels_a_metre(to_double(tri.P[0]), longest) / pixels_, most_a_metre);
+      if (!(most * longest < kMostLatticeCells)) has = true;
+    }
+  });
+  return has;
 }
 
 TessellationRule Dicing::rule() const
@@ -95,6 +114,7 @@ double Dicing::height(double x, double y, double level) const
 
 void Dicing::set_base_place(std::uint32_t* triangle, float* b1, float* b2) const
 {
+  if (parts_.empty()) return;
   const LatticeTriangle& part = parts_[*triangle];
   const Vec2f place = part.base_weights(*b1, *b2);
   *triangle = part.base;

@@ -38,17 +38,16 @@ class Dicing {
          double pixels,
          const RequireBytes& require = {});
 
-  /// What dicing a mesh takes at least, with its tessellation.
+  /// What dicing a mesh takes at least, with its tessellation: a grid of one cell each, with Embree's box.
   static std::uint64_t least_bytes(const MeshView& mesh)
   {
-    constexpr std::uint64_t kTree = 150;
-    return mesh.num_triangles *
-           (sizeof(LatticeTriangle) + sizeof(DisplacedTriangle) + sizeof(TessellatedTriangle) + kTree);
+    constexpr std::uint64_t kGrid = 4 * sizeof(Vec3f) + sizeof(RTCGrid) + 80;
+    return mesh.num_triangles * (sizeof(TessellatedTriangle) + kGrid);
   }
 
-  /// The parts, in place of the mesh's triangles.
+  /// The parts, in place of the mesh's triangles; these themselves, where none is cut.
   const DisplacedMeshView& mesh() const { return mesh_; }
-  /// Which parts of the mesh's triangles they are.
+  /// Which parts of the mesh's triangles they are; empty: they are these triangles.
   std::span<const LatticeTriangle> parts() const { return parts_; }
   /// What a tessellation of the parts is made by.
   TessellationRule rule() const;
@@ -66,6 +65,8 @@ class Dicing {
   }
 
  private:
+  bool has_long_sides(double most_a_metre) const;
+
   SeenInstances seen_;
   double pixels_, texel_;
   std::vector<const HeightFieldView*> levels_;

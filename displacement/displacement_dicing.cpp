@@ -15,15 +15,15 @@ namespace {
 
 /// Of meshes diced to a pixel, facets included: benchmarks/cycles' sphere and torus took .34 of what they take by chord. Of a
 /// texture's every texel, tessellations are larger than caches, and cost more (methods/tessellate.cpp).
-constexpr MethodCost kDicingCost{208, 29, 350};
+constexpr MethodCost kDicingCost{208, 29, 110};
 
 /// What rays take exactly where such a mesh covers the picture: 0.5 to 2.1 µs more than diced over seven scenes of
 /// benchmarks/displacement/first_pixel.py, 1.0 in the mean. (Rays of the bench, from one surface alone, take 930 ns in all.)
 constexpr MethodCost kExactCost{1250, 0, 0};
 
-/// A mesh's own triangles take this besides: sides are brought together, and corners. Two million took 4 s more than their
+/// A mesh's own triangles take this besides: sides are brought together, and corners. Two million took .8 s more than their
 /// micro-triangles.
-constexpr double kOwnTriangleSeconds = 2e-6;
+constexpr double kOwnTriangleSeconds = 4e-7;
 
 /// Refuses what would not fit, before anything large is allocated.
 /// @param bytes  all tessellations so far, this one included
@@ -177,7 +177,7 @@ void DisplacementSet::dice(PreparedMesh& displaced,
   auto dicing = std::make_unique<Dicing>(use.mesh, geometry.mesh, levels, texel, picture_view(use, options), use.places,
                                          error, options.require);
   const TessellationRule rule = dicing->rule();
-  TessellationLayout layout = tessellation_layout_make(dicing->mesh(), TessellationKind::kQuads, rule);
+  TessellationLayout layout = tessellation_layout_make(dicing->mesh(), TessellationKind::kBlocks, rule);
   const std::uint64_t bytes = tessellation_peak_bytes(layout, kRenderTessellation) + dicing->bytes();
   const MethodOffer offers[] = {
       {geometry.method, kExactCost, 0, 0},

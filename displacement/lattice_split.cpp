@@ -13,8 +13,6 @@ namespace relief {
 
 namespace {
 
-/// A part is halved along sides with more cells than this: within it cells near to the camera and far from it are alike.
-constexpr double kMostCells = 256;
 /// Weights then have at most 14 + 8 bits, and are exact in single precision.
 constexpr int kMostHalvings = 14;
 
@@ -59,13 +57,13 @@ class Splitter {
     for (int k = 0; k < 3; ++k) {
       const Vec2f from = corner[k], to = corner[(k + 1) % 3];
       cells[k] = std::min(cells_(at(from), at(to)), most_cells_ * part_of_side(from, to));
-      if (cells[k] > kMostCells && halvings < kMostHalvings) ++num_long;
+      if (cells[k] > kMostLatticeCells && halvings < kMostHalvings) ++num_long;
     }
     if (num_long == 0) {
       add(corner, cells);
       return;
     }
-    const auto is_long = [&](int k) { return cells[k] > kMostCells; };
+    const auto is_long = [&](int k) { return cells[k] > kMostLatticeCells; };
     const auto middle = [&](int k) { return 0.5f * (corner[k] + corner[(k + 1) % 3]); };
     const int next = halvings + 1;
     if (num_long == 3) {
@@ -108,7 +106,7 @@ class Splitter {
     for (int k = 0; k < 3; ++k) {
       t.corner[k] = corner[k];
       t.side_n[k] = 1;
-      while (t.side_n[k] < cells[k] && t.side_n[k] < kMostCells) t.side_n[k] *= 2;
+      while (t.side_n[k] < cells[k] && t.side_n[k] < kMostLatticeCells) t.side_n[k] *= 2;
       t.n = std::max(t.n, t.side_n[k]);
     }
     count_.add();

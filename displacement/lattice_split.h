@@ -16,6 +16,9 @@ using CellsAlong = std::function<double(Vec3f, Vec3f)>;
 /// Fails, by throwing, unless there is room for so many bytes.
 using RequireBytes = std::function<void(std::uint64_t)>;
 
+/// A part is halved along sides with more cells than this: within it cells near to the camera and far from it are alike.
+inline constexpr double kMostLatticeCells = 256;
+
 /// The same lattice for all triangles.
 /// @param n  cells along each side, a power of two up to kMostHeightCells
 std::vector<LatticeTriangle> lattices_make(const MeshView& mesh, std::int32_t n);

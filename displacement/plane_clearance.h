@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <initializer_list>
 #include <optional>
 #include <vector>
 
@@ -120,6 +121,22 @@ struct NearPlanes {
   Vec3d error;   ///< per axis, of the point and of an origin
   double reach;  ///< micro-triangles within this distance count
   std::vector<NearPlane> planes;
+
+  /// Whether a box around some points is within reach: what tells of most of them that `add` need not be asked.
+  bool may_reach(std::initializer_list<Vec3d> points) const
+  {
+    double squared = 0;
+    for (double Vec3d::*axis : {&Vec3d::x, &Vec3d::y, &Vec3d::z}) {
+      double least = static_cast<double>(kInfinity), most = -least;
+      for (const Vec3d& point : points) {
+        least = min(least, point.*axis);
+        most = max(most, point.*axis);
+      }
+      const double out = max(max(least - P.*axis, P.*axis - most), 0.0);
+      squared += out * out;
+    }
+    return squared <= reach * reach;
+  }
 
   /// @param winding  1, or −1 of triangles that run clockwise around the normal of their front
   void add(double winding, Vec3d a, Vec3d b, Vec3d c)

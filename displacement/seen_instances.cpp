@@ -61,6 +61,17 @@ double SeenInstances::pixels(Vec3f a, Vec3f b) const
   return most;
 }
 
+double SeenInstances::most_pixels_a_metre(Vec3d middle, double radius) const
+{
+  double most = 0;
+  for (const Seen& seen : instances_) {
+    if (!(seen.most > most)) break;
+    most = max(most, seen.stretch * view_.most_pixels_a_metre(place(seen.world_from_object, middle),
+                                                              seen.stretch * radius, coarser_ == Coarser::kOutside));
+  }
+  return most;
+}
+
 double SeenInstances::pixels_a_metre(Vec3d P) const
 {
   double most = 0;

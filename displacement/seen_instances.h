@@ -27,6 +27,8 @@ class SeenInstances {
   /// Length of a line in the picture, pixels, less where it may be coarser; within a 16th of the longest of all instances.
   /// @param a, b  object space; the same bits either way
   double pixels(Vec3f a, Vec3f b) const;
+  /// What a metre is no longer than, anywhere within a ball.
+  double most_pixels_a_metre(Vec3d middle, double radius) const;
   /// The same of a metre at a point of the mesh.
   double pixels_a_metre(Vec3d P) const;
 

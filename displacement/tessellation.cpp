@@ -3,77 +3,19 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
+#include <unordered_map>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_reduce.h>
 
 #include "displacement/plane_clearance.h"
 #include "displacement/shared_edges.h"
+#include "displacement/tessellation_lattice.h"
 
 namespace relief {
 
 namespace {
-
-/// Barycentric weights of a lattice vertex and, if it is on an edge, where.
-struct LatticeVertex {
-  double b[3];
-  int edge = -1;           ///< −1: inside
-  std::uint32_t step = 0;  ///< along the edge, from its first vertex
-  std::uint32_t steps = 1;
-};
-
-/// Position along an edge, of `segments` rows, among the points the edge has; every point is met by some row.
-std::uint32_t snap(std::uint32_t row, std::uint32_t segments, std::uint32_t edge_segments)
-{
-  // Every edge has a segment. NOLINTNEXTLINE(clang-analyzer-core.DivideZero)
-  return static_cast<std::uint32_t>((2 * std::uint64_t{row} * edge_segments + segments) /
-                                    (2 * std::uint64_t{segments}));
-}
-
-LatticeVertex edge_vertex(int edge, std::uint32_t step, std::uint32_t steps)
-{
-  LatticeVertex vertex{{0, 0, 0}, edge, step, steps};
-  const int next = edge == 2 ? 0 : edge + 1;
-  vertex.b[edge] = static_cast<double>(steps - step) / steps;
-  vertex.b[next] = static_cast<double>(step) / steps;
-  return vertex;
-}
-
-/// Vertex (i, j) of a triangle's lattice: weights near i/n of vertex 1 and j/n of vertex 2.
-LatticeVertex triangle_vertex(const TessellatedTriangle& t, std::uint32_t i, std::uint32_t j)
-{
-  const std::uint32_t n = t.segments, k = n - i - j;
-  const std::uint32_t* of_edge = t.edge_segments;
-  if (j == 0) return edge_vertex(0, snap(i, n, of_edge[0]), of_edge[0]);
-  if (k == 0) return edge_vertex(1, snap(j, n, of_edge[1]), of_edge[1]);
-  if (i == 0) return edge_vertex(2, snap(k, n, of_edge[2]), of_edge[2]);
-  return {{static_cast<double>(k) / n, static_cast<double>(i) / n, static_cast<double>(j) / n}};
-}
-
-/// Vertex (x, y) of the grid at a corner: x leads to the middle of the edge that starts there, y to that of the edge that
-/// ends there, and the opposite vertex is the triangle's centre.
-LatticeVertex grid_vertex(const TessellatedTriangle& t, int corner, std::uint32_t x, std::uint32_t y)
-{
-  const std::uint32_t n = t.segments;
-  const int next = corner == 2 ? 0 : corner + 1, previous = corner == 0 ? 2 : corner - 1;
-  if (y == 0) {
-    const std::uint32_t half = t.edge_segments[corner];
-    return edge_vertex(corner, snap(x, n, half), 2 * half);
-  }
-  if (x == 0) {
-    const std::uint32_t half = t.edge_segments[previous];
-    return edge_vertex(previous, 2 * half - snap(y, n, half), 2 * half);
-  }
-  // Whole sixths of 1/n² keep the weights exact, so that grids agree along the sides that they share.
-  const std::uint64_t fx = x, fy = y, gx = n - x, gy = n - y;
-  const std::uint64_t at_corner = gx * gy, along = fx * gy, across = gx * fy, at_centre = fx * fy;
-  const double whole = 6.0 * static_cast<double>(n) * n;
-  LatticeVertex vertex{{0, 0, 0}};
-  vertex.b[corner] = static_cast<double>(6 * at_corner + 3 * along + 3 * across + 2 * at_centre) / whole;
-  vertex.b[next] = static_cast<double>(3 * along + 2 * at_centre) / whole;
-  vertex.b[previous] = static_cast<double>(3 * across + 2 * at_centre) / whole;
-  return vertex;
-}
 
 struct Placed {
   Vec3d P;
@@ -104,6 +46,44 @@ double seam_tolerance(const DisplacedMeshView& mesh)
   return 1e-6 * std::abs(mesh.scale) * (high - low);
 }
 
+/// Whether two vertices read the map at one place, or whole periods apart: then their heights need not be compared, as they differ by
+/// less than a tenth of seam_tolerance.
+bool read_alike(const DisplacedMeshView& mesh,
+                const DisplacedTriangle& a,
+                int of_a,
+                const DisplacedTriangle& b,
+                int of_b)
+{
+  const auto are_alike = [](const LatticeAxis& axis, double x, double y) {
+    constexpr double kTexels = 1e-8;
+    double apart = x - y;
+    if (apart != 0 && axis.wrap != Wrap::kClamp) apart -= axis.num_cells * std::nearbyint(apart / axis.num_cells);
+    return std::abs(apart) <= kTexels;
+  };
+  return are_alike(mesh.field->x, a.x[of_a], b.x[of_b]) && are_alike(mesh.field->y, a.y[of_a], b.y[of_b]);
+}
+
+bool corners_read_alike(const DisplacedMeshView& mesh, std::uint32_t a, std::uint32_t b)
+{
+  return read_alike(mesh, mesh.triangles[a / 3], static_cast<int>(a % 3), mesh.triangles[b / 3],
+                    static_cast<int>(b % 3));
+}
+
+/// An edge as the one that computes its points has it.
+struct SharedEdge {
+  bool same_way;  ///< both run from the same end to the same end
+  bool alike;     ///< both read the map at the same places
+};
+
+SharedEdge shared_edge(const DisplacedMeshView& mesh, std::uint32_t edge, std::uint32_t owner)
+{
+  // Positions tell which way: the ends of an edge are places.
+  const bool same_way = mesh.triangles[owner / 3].P[owner % 3] == mesh.triangles[edge / 3].P[edge % 3];
+  const std::uint32_t ends[2] = {owner, edge_end(owner)};
+  return {same_way, corners_read_alike(mesh, edge, ends[same_way ? 0 : 1]) &&
+                        corners_read_alike(mesh, edge_end(edge), ends[same_way ? 1 : 0])};
+}
+
 /// The corner that computes a corner's point: the first one at the same place with the same height.
 std::vector<std::uint32_t> corner_owners(const DisplacedMeshView& mesh,
                                          const TessellationRule& rule,
@@ -111,26 +91,28 @@ std::vector<std::uint32_t> corner_owners(const DisplacedMeshView& mesh,
 {
   const std::size_t count = id.size();
   const double tolerance = seam_tolerance(mesh);
-  std::vector<double> d(count);
+  std::vector<std::uint32_t> owner = id;
+  std::vector<std::uint8_t> is_apart(count);
   tbb::parallel_for(std::size_t{0}, count, [&](std::size_t corner) {
+    is_apart[corner] =
+        id[corner] != corner && !corners_read_alike(mesh, static_cast<std::uint32_t>(corner), id[corner]);
+  });
+  const auto d_at = [&](std::uint32_t corner) {
     double b[3] = {0, 0, 0};
     b[corner % 3] = 1;
-    d[corner] = place(mesh, rule, mesh.triangles[corner / 3], b).d;
-  });
-  // Owners of one place in a chain that starts at its first corner, whose height nearly all have.
-  std::vector<std::uint32_t> owner = id;
-  constexpr std::uint32_t kNone = ~0u;
-  std::vector<std::uint32_t> next;
+    return place(mesh, rule, mesh.triangles[corner / 3], b).d;
+  };
+  // Those with heights of their own, by the first corner at their place, whose height nearly all have.
+  std::unordered_map<std::uint32_t, std::vector<std::pair<std::uint32_t, double>>> others;
   for (std::uint32_t corner = 0; corner < count; ++corner) {
-    std::uint32_t at = id[corner];
-    if (at == corner || std::abs(d[at] - d[corner]) <= tolerance) continue;
-    if (next.empty()) next.assign(count, kNone);
-    while (std::abs(d[at] - d[corner]) > tolerance && next[at] != kNone) at = next[at];
-    if (std::abs(d[at] - d[corner]) <= tolerance) {
-      owner[corner] = at;
-    } else {
-      next[at] = owner[corner] = corner;
-    }
+    if (is_apart[corner] == 0) continue;
+    const double d = d_at(corner);
+    if (std::abs(d_at(id[corner]) - d) <= tolerance) continue;
+    auto& known = others[id[corner]];
+    const auto same = std::find_if(known.begin(), known.end(),
+                                   [&](const auto& other) { return std::abs(other.second - d) <= tolerance; });
+    owner[corner] = same != known.end() ? same->first : corner;
+    if (same == known.end()) known.emplace_back(corner, d);
   }
   return owner;
 }
@@ -143,8 +125,26 @@ std::uint32_t whole_segments(double wanted)
   return static_cast<std::uint32_t>(std::clamp(std::ceil(wanted - 1e-3), 1.0, 1e6));
 }
 
-/// Vertices of a triangle with n segments a side.
-std::uint64_t triangle_vertices(std::uint64_t n) { return (n + 1) * (n + 2) / 2; }
+/// What a triangle is divided into.
+struct Division {
+  std::uint64_t vertices, primitives, micro_triangles;
+};
+
+Division division_of(TessellationKind kind, std::uint32_t segments)
+{
+  const std::uint64_t n = segments;
+  switch (kind) {
+    case TessellationKind::kGrids:
+      return {3 * (n + 1) * (n + 1), 3, 6 * n * n};
+    case TessellationKind::kBlocks: {
+      const LatticeBlocks blocks(segments);
+      return {blocks.num_vertices(), blocks.num_blocks(), n * n};
+    }
+    case TessellationKind::kQuads:
+      break;
+  }
+  return {LatticeRows{n}.num_vertices(), n * (n + 1) / 2, n * n};
+}
 
 }  // namespace
 
@@ -173,10 +173,10 @@ void divide_triangles(std::uint32_t num_triangles, const Segments& segments, Tes
     }
     t.first_vertex = static_cast<std::uint32_t>(layout->num_vertices);
     t.first_primitive = static_cast<std::uint32_t>(layout->num_primitives);
-    const std::uint64_t n = t.segments;
-    layout->num_vertices += grids ? 3 * (n + 1) * (n + 1) : triangle_vertices(n);
-    layout->num_primitives += grids ? 3 : n * (n + 1) / 2;
-    layout->num_micro_triangles += grids ? 6 * n * n : n * n;
+    const Division division = division_of(layout->kind, t.segments);
+    layout->num_vertices += division.vertices;
+    layout->num_primitives += division.primitives;
+    layout->num_micro_triangles += division.micro_triangles;
   }
 }
 
@@ -193,7 +193,9 @@ TessellationLayout tessellation_layout_make(const DisplacedMeshView& mesh,
   layout.edge_owner = weld_edges(id);
 
   std::vector<std::uint32_t> segments(layout.edge_owner.size());
-  tbb::parallel_for(std::size_t{0}, segments.size(), [&](std::size_t edge) {
+  tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(segments.size()), [&](std::uint32_t edge) {
+    const std::uint32_t owner = layout.edge_owner[edge];
+    if (owner != edge && shared_edge(mesh, edge, owner).alike) return;  // which asks for as many
     segments[edge] = whole_segments(rule.segments(mesh.triangles[edge / 3], static_cast<int>(edge % 3)));
   });
   for (std::uint32_t edge = 0; edge < segments.size(); ++edge) {
@@ -226,17 +228,22 @@ TessellationLayout tessellation_layout_least(const DisplacedMeshView& mesh, Tess
 std::uint64_t tessellation_peak_bytes(const TessellationLayout& layout, const TessellationBuild& build)
 {
   // Peaks of Embree 3.13.5 beside its inputs, on flat and wavy meshes of .05 to 9 million micro-triangles: 62 to 74 bytes for
-  // each (39 to 42 stay), 33 to 51 if compact (19 to 36 stay), and 82 to 116 for each 2 × 2 cells of a grid.
-  constexpr std::uint64_t kMicroTriangle = 76, kCompactMicroTriangle = 53, kGridBlock = 116;
+  // each (39 to 42 stay), 33 to 51 if compact (19 to 36 stay), and for each 2 × 2 cells 82 to 116 of a grid, 87 to 131 of blocks. Of
+  // a million of these on Embree makes the tree where what it sorts was, and 68 to 71 are enough.
+  constexpr std::uint64_t kMicroTriangle = 76, kCompactMicroTriangle = 53, kGridQuarter = 116, kBlockQuarter = 134,
+                          kManyBlocks = 1'000'000, kQuarterOfMany = 80;
   if (layout.kind == TessellationKind::kQuads) {
     return layout.bytes() + layout.num_micro_triangles * (build.compact ? kCompactMicroTriangle : kMicroTriangle);
   }
-  std::uint64_t num_blocks = 0;
+  const bool blocks = layout.kind == TessellationKind::kBlocks;
+  std::uint64_t num_quarters = 0;
   for (const TessellatedTriangle& t : layout.triangles) {
-    const std::uint64_t blocks = (std::uint64_t{t.segments} + 1) / 2;
-    num_blocks += 3 * blocks * blocks;
+    const std::uint64_t along = (std::uint64_t{t.segments} + 1) / 2;
+    num_quarters += blocks ? LatticeBlocks(t.segments).num_quarters() : 3 * along * along;
   }
-  return layout.bytes() + num_blocks * kGridBlock;
+  return layout.bytes() + num_quarters * (!blocks                      ? kGridQuarter
+                                          : num_quarters < kManyBlocks ? kBlockQuarter
+                                                                       : kQuarterOfMany);
 }
 
 struct Tessellation::MicroTriangle {
@@ -251,6 +258,23 @@ struct Tessellation::MicroTriangle {
     b2 += weight[k] * of.b[2];
   }
 };
+
+namespace {
+
+void put(Vec3f P, float* out)
+{
+  out[0] = P.x;
+  out[1] = P.y;
+  out[2] = P.z;
+}
+
+/// @param n  cells a side
+RTCGrid square_grid(std::uint32_t first_vertex, std::uint32_t n)
+{
+  return {first_vertex, n + 1, static_cast<unsigned short>(n + 1), static_cast<unsigned short>(n + 1)};
+}
+
+}  // namespace
 
 Tessellation::Tessellation(const DisplacedMeshView& mesh, TessellationLayout layout, const TessellationRule& rule)
     : mesh_(mesh), layout_(std::move(layout))
@@ -268,7 +292,7 @@ Tessellation::Tessellation(const DisplacedMeshView& mesh, TessellationLayout lay
   } else {
     grids_.resize(layout_.num_primitives);
   }
-  tbb::parallel_for(std::uint32_t{0}, mesh_.num_triangles, [&](std::uint32_t index) { fill(index, rule); });
+  fill(rule);
   layout_.edge_owner = {};
   layout_.corner_owner = {};
   // Of every 2^kLog2Owners-th primitive, and the last triangle once more.
@@ -280,65 +304,165 @@ Tessellation::Tessellation(const DisplacedMeshView& mesh, TessellationLayout lay
   owners_.resize((layout_.num_primitives >> kLog2Owners) + 2, mesh_.num_triangles - 1);
 }
 
-void Tessellation::fill(std::uint32_t index, const TessellationRule& rule)
+/// Points that several base triangles have, evaluated once.
+struct Tessellation::SharedPoints {
+  std::vector<Vec3f> corners, on_edges;
+  std::vector<std::uint32_t> of_corner;  ///< by corner: its place in `corners`
+  std::vector<std::uint32_t>
+      first_of_edge;  ///< by edge that computes its points: the place of the first between its ends
+
+  SharedPoints(const DisplacedMeshView& mesh, const TessellationLayout& layout, const TessellationRule& rule)
+      : of_corner(layout.corner_owner.size()), first_of_edge(layout.edge_owner.size())
+  {
+    std::vector<std::uint32_t> owned;
+    std::uint64_t num_on_edges = 0;
+    for (std::uint32_t k = 0; k < of_corner.size(); ++k) {
+      const std::uint32_t owner = layout.corner_owner[k];
+      of_corner[k] = owner == k ? static_cast<std::uint32_t>(owned.size()) : of_corner[owner];
+      if (owner == k) owned.push_back(k);
+      if (layout.edge_owner[k] != k) continue;
+      first_of_edge[k] = static_cast<std::uint32_t>(num_on_edges);
+      num_on_edges += steps_of(layout, k) - 1;
+    }
+    corners.resize(owned.size());
+    tbb::parallel_for(std::size_t{0}, owned.size(), [&](std::size_t k) {
+      double b[3] = {0, 0, 0};
+      b[owned[k] % 3] = 1;
+      corners[k] = to_float(place(mesh, rule, mesh.triangles[owned[k] / 3], b).P);
+    });
+    on_edges.resize(num_on_edges);
+    tbb::parallel_for(std::uint32_t{0}, static_cast<std::uint32_t>(first_of_edge.size()), [&](std::uint32_t edge) {
+      if (layout.edge_owner[edge] != edge) return;
+      const std::uint32_t steps = steps_of(layout, edge);
+      for (std::uint32_t step = 1; step < steps; ++step) {
+        const LatticeVertex at = edge_vertex(static_cast<int>(edge % 3), step, steps);
+        on_edges[first_of_edge[edge] + step - 1] = to_float(place(mesh, rule, mesh.triangles[edge / 3], at.b).P);
+      }
+    });
+  }
+
+  /// Steps along a whole edge.
+  static std::uint32_t steps_of(const TessellationLayout& layout, std::uint32_t edge)
+  {
+    const std::uint32_t segments = layout.triangles[edge / 3].edge_segments[edge % 3];
+    return layout.kind == TessellationKind::kGrids ? 2 * segments : segments;
+  }
+};
+
+/// A vertex of a base triangle, the same to the last bit in all that have it.
+Vec3f Tessellation::position(std::uint32_t index,
+                             const LatticeVertex& vertex,
+                             const TessellationRule& rule,
+                             const SharedPoints& shared) const
+{
+  const DisplacedTriangle& tri = mesh_.triangles[index];
+  if (vertex.edge < 0) return to_float(place(mesh_, rule, tri, vertex.b).P);
+  const std::uint32_t edge = 3 * index + static_cast<std::uint32_t>(vertex.edge);
+  if (vertex.step == 0) return shared.corners[shared.of_corner[edge]];
+  if (vertex.step == vertex.steps) return shared.corners[shared.of_corner[edge_end(edge)]];
+  const std::uint32_t owner = layout_.edge_owner[edge];
+  const Vec3f* const points = &shared.on_edges[shared.first_of_edge[owner]];
+  if (owner == edge) return points[vertex.step - 1];
+  const SharedEdge as = shared_edge(mesh_, edge, owner);
+  const std::uint32_t step = as.same_way ? vertex.step : vertex.steps - vertex.step;
+  if (as.alike) return points[step - 1];
+  const Placed own = place(mesh_, rule, tri, vertex.b);
+  const LatticeVertex there = edge_vertex(static_cast<int>(owner % 3), step, vertex.steps);
+  const double d = place(mesh_, rule, mesh_.triangles[owner / 3], there.b).d;
+  return std::abs(d - own.d) <= seam_tolerance(mesh_) ? points[step - 1] : to_float(own.P);
+}
+
+/// All vertices of a base triangle's lattice.
+/// @param out  in rows, see LatticeRows
+void Tessellation::fill_rows(std::uint32_t index,
+                             const TessellationRule& rule,
+                             const SharedPoints& shared,
+                             float* out) const
 {
   const TessellatedTriangle& t = layout_.triangles[index];
-  const DisplacedTriangle& tri = mesh_.triangles[index];
-  const double tolerance = seam_tolerance(mesh_);
-
-  const auto position = [&](const LatticeVertex& vertex) {
-    Placed own = place(mesh_, rule, tri, vertex.b);
-    if (vertex.edge < 0) return own.P;
-    if (vertex.step == 0 || vertex.step == vertex.steps) {
-      const int corner = vertex.step == 0 ? vertex.edge : (vertex.edge == 2 ? 0 : vertex.edge + 1);
-      const std::uint32_t owner = layout_.corner_owner[3 * index + static_cast<std::uint32_t>(corner)];
-      double b[3] = {0, 0, 0};
-      b[owner % 3] = 1;
-      return place(mesh_, rule, mesh_.triangles[owner / 3], b).P;
-    }
-    const std::uint32_t edge = 3 * index + static_cast<std::uint32_t>(vertex.edge);
-    const std::uint32_t owner = layout_.edge_owner[edge];
-    if (owner == edge) return own.P;
-    // The owner may run the other way. Positions tell: the ends of an edge are places.
-    const DisplacedTriangle& other = mesh_.triangles[owner / 3];
-    const int first = static_cast<int>(owner % 3);
-    const bool same_way = other.P[first] == tri.P[vertex.edge];
-    const LatticeVertex there = edge_vertex(first, same_way ? vertex.step : vertex.steps - vertex.step, vertex.steps);
-    const Placed shared = place(mesh_, rule, other, there.b);
-    return std::abs(shared.d - own.d) <= tolerance ? shared.P : own.P;
-  };
-  float* out = vertices_.get() + 3 * std::size_t{t.first_vertex};
-  const auto put = [&](const LatticeVertex& vertex) {
-    const Vec3f P = to_float(position(vertex));
-    *out++ = P.x;
-    *out++ = P.y;
-    *out++ = P.z;
-  };
-
   const std::uint32_t n = t.segments;
-  if (layout_.kind == TessellationKind::kGrids) {
-    for (int corner = 0; corner < 3; ++corner) {
-      const std::uint32_t first = static_cast<std::uint32_t>(corner) * (n + 1) * (n + 1);
-      grids_[t.first_primitive + static_cast<std::uint32_t>(corner)] = {
-          t.first_vertex + first, n + 1, static_cast<unsigned short>(n + 1), static_cast<unsigned short>(n + 1)};
-      for (std::uint32_t y = 0; y <= n; ++y) {
-        for (std::uint32_t x = 0; x <= n; ++x) put(grid_vertex(t, corner, x, y));
-      }
-    }
-    return;
-  }
-  std::uint32_t* index_out = indices_.get() + 4 * std::size_t{t.first_primitive};
-  std::uint32_t row = t.first_vertex;
   for (std::uint32_t j = 0; j <= n; ++j) {
+    for (std::uint32_t i = 0; i + j <= n; ++i, out += 3)
+      put(position(index, triangle_vertex(t, i, j), rule, shared), out);
+  }
+}
+
+void Tessellation::fill_quads(std::uint32_t index, const TessellationRule& rule, const SharedPoints& shared)
+{
+  const TessellatedTriangle& t = layout_.triangles[index];
+  const std::uint32_t n = t.segments;
+  fill_rows(index, rule, shared, vertices_.get() + 3 * std::size_t{t.first_vertex});
+  std::uint32_t* out = indices_.get() + 4 * std::size_t{t.first_primitive};
+  std::uint32_t row = t.first_vertex;
+  for (std::uint32_t j = 0; j < n; ++j) {
     const std::uint32_t next_row = row + (n - j + 1);
-    for (std::uint32_t i = 0; i + j <= n; ++i) put(triangle_vertex(t, i, j));
     for (std::uint32_t i = 0; i + j < n; ++i) {
       const std::uint32_t a = row + i, c = next_row + i;
       // Embree takes a quadrilateral whose last two vertices are one for a triangle.
-      for (const std::uint32_t v : {a, a + 1, i + j + 1 == n ? c : c + 1, c}) *index_out++ = v;
+      for (const std::uint32_t v : {a, a + 1, i + j + 1 == n ? c : c + 1, c}) *out++ = v;
     }
     row = next_row;
   }
+}
+
+void Tessellation::fill_grids(std::uint32_t index, const TessellationRule& rule, const SharedPoints& shared)
+{
+  const TessellatedTriangle& t = layout_.triangles[index];
+  const std::uint32_t n = t.segments;
+  float* out = vertices_.get() + 3 * std::size_t{t.first_vertex};
+  for (std::uint32_t corner = 0; corner < 3; ++corner) {
+    grids_[t.first_primitive + corner] = square_grid(t.first_vertex + corner * (n + 1) * (n + 1), n);
+    for (std::uint32_t y = 0; y <= n; ++y) {
+      for (std::uint32_t x = 0; x <= n; ++x, out += 3)
+        put(position(index, grid_vertex(t, static_cast<int>(corner), x, y), rule, shared), out);
+    }
+  }
+}
+
+/// @param rows  room for the lattice
+void Tessellation::fill_blocks(std::uint32_t index,
+                               const TessellationRule& rule,
+                               const SharedPoints& shared,
+                               std::vector<float>* rows)
+{
+  const TessellatedTriangle& t = layout_.triangles[index];
+  const LatticeRows lattice{t.segments};
+  const LatticeBlocks blocks(t.segments);
+  rows->resize(3 * lattice.num_vertices());
+  fill_rows(index, rule, shared, rows->data());
+  for (std::uint32_t k = 0; k < blocks.num_blocks(); ++k) {
+    const LatticeBlocks::Block block = blocks.block(k);
+    const std::uint32_t first = t.first_vertex + block.first_vertex;
+    grids_[t.first_primitive + k] = square_grid(first, block.cells);
+    float* out = vertices_.get() + 3 * std::size_t{first};
+    for (std::uint32_t j = block.j; j <= block.j + block.cells; ++j) {
+      const float* row = rows->data() + 3 * lattice.vertex(0, j);
+      for (std::uint32_t i = block.i; i <= block.i + block.cells; ++i, out += 3)
+        std::copy_n(row + 3 * std::size_t{std::min(i, t.segments - j)}, 3, out);
+    }
+  }
+}
+
+/// Evaluates all vertices, and says which are next to each other.
+void Tessellation::fill(const TessellationRule& rule)
+{
+  const SharedPoints shared(mesh_, layout_, rule);
+  tbb::parallel_for(tbb::blocked_range<std::uint32_t>(0, mesh_.num_triangles), [&](const auto& range) {
+    std::vector<float> rows;
+    for (std::uint32_t index = range.begin(); index < range.end(); ++index) {
+      switch (layout_.kind) {
+        case TessellationKind::kQuads:
+          fill_quads(index, rule, shared);
+          break;
+        case TessellationKind::kGrids:
+          fill_grids(index, rule, shared);
+          break;
+        case TessellationKind::kBlocks:
+          fill_blocks(index, rule, shared, &rows);
+          break;
+      }
+    }
+  });
 }
 
 Box3 Tessellation::bounds() const
@@ -352,13 +476,17 @@ Box3 Tessellation::bounds() const
       box_union);
 }
 
+RTCGeometryType Tessellation::geometry_type() const
+{
+  return layout_.kind == TessellationKind::kQuads ? RTC_GEOMETRY_TYPE_QUAD : RTC_GEOMETRY_TYPE_GRID;
+}
+
 RTCGeometry Tessellation::geometry_make(RTCDevice device) const
 {
-  const bool grids = layout_.kind == TessellationKind::kGrids;
-  RTCGeometry geometry = rtcNewGeometry(device, grids ? RTC_GEOMETRY_TYPE_GRID : RTC_GEOMETRY_TYPE_QUAD);
+  RTCGeometry geometry = rtcNewGeometry(device, geometry_type());
   rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, vertices_.get(), 0,
                              3 * sizeof(float), layout_.num_vertices);
-  if (grids) {
+  if (layout_.kind != TessellationKind::kQuads) {
     rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_GRID, 0, RTC_FORMAT_GRID, grids_.data(), 0, sizeof(RTCGrid),
                                layout_.num_primitives);
   } else {
@@ -388,7 +516,8 @@ std::vector<SidePoint> Tessellation::side(std::uint32_t triangle, int k) const
   }
   for (std::uint32_t step = 0; step <= n; ++step) {
     const std::uint32_t i = k == 0 ? step : k == 1 ? n - step : 0, j = k == 0 ? 0 : k == 1 ? step : n - step;
-    add(triangle_vertex(t, i, j), std::uint64_t{j} * (n + 1) - std::uint64_t{j} * (std::uint64_t{j} - 1) / 2 + i);
+    const bool in_blocks = layout_.kind == TessellationKind::kBlocks;
+    add(triangle_vertex(t, i, j), in_blocks ? LatticeBlocks(n).vertex(i, j) : LatticeRows{n}.vertex(i, j));
   }
   return out;
 }
@@ -404,6 +533,27 @@ std::uint32_t Tessellation::triangle_of(std::uint32_t primitive) const
   return static_cast<std::uint32_t>(std::prev(after) - first);
 }
 
+namespace {
+
+/// A cell of a grid, and a place in it.
+struct GridPlace {
+  std::uint32_t x, y;
+  double u, v;
+};
+
+/// @param u, v  as Embree reports them: they span the whole grid
+/// @param n     cells a side
+GridPlace grid_place(float u, float v, std::uint32_t n)
+{
+  const double gx = std::clamp(static_cast<double>(u) * n, 0.0, static_cast<double>(n));
+  const double gy = std::clamp(static_cast<double>(v) * n, 0.0, static_cast<double>(n));
+  const std::uint32_t x = std::min(static_cast<std::uint32_t>(gx), n - 1);
+  const std::uint32_t y = std::min(static_cast<std::uint32_t>(gy), n - 1);
+  return {x, y, gx - x, gy - y};
+}
+
+}  // namespace
+
 Tessellation::MicroTriangle Tessellation::micro_triangle(std::uint32_t primitive, float u, float v) const
 {
   MicroTriangle micro;
@@ -412,12 +562,7 @@ Tessellation::MicroTriangle Tessellation::micro_triangle(std::uint32_t primitive
   const std::uint32_t n = t.segments, local = primitive - t.first_primitive;
 
   if (layout_.kind == TessellationKind::kGrids) {
-    // Embree's u and v span the whole grid.
-    const double gx = std::clamp(static_cast<double>(u) * n, 0.0, static_cast<double>(n));
-    const double gy = std::clamp(static_cast<double>(v) * n, 0.0, static_cast<double>(n));
-    const std::uint32_t x = std::min(static_cast<std::uint32_t>(gx), n - 1);
-    const std::uint32_t y = std::min(static_cast<std::uint32_t>(gy), n - 1);
-    const double fx = gx - x, fy = gy - y;
+    const auto [x, y, fx, fy] = grid_place(u, v, n);
     const bool lower = fx + fy <= 1;
     const std::uint32_t at[3][2] = {{lower ? x : x + 1, lower ? y : y + 1}, {x + 1, y}, {x, y + 1}};
     micro.weight[0] = lower ? 1 - fx - fy : fx + fy - 1;
@@ -430,18 +575,38 @@ Tessellation::MicroTriangle Tessellation::micro_triangle(std::uint32_t primitive
     }
     return micro;
   }
-  // Rows from j on have r(r + 1)/2 quadrilaterals, r = n − j.
-  const std::uint64_t left = std::uint64_t{n} * (n + 1) / 2 - local;
-  auto rows = static_cast<std::uint64_t>(0.5 * std::sqrt(8.0 * static_cast<double>(left) + 1.0));
-  while (rows * (rows + 1) / 2 < left) ++rows;
-  while (rows * (rows - 1) / 2 >= left) --rows;
-  const auto j = static_cast<std::uint32_t>(n - rows);
-  const auto i = static_cast<std::uint32_t>(rows * (rows + 1) / 2 - left);
+  std::uint32_t i, j;
+  double x, y;  // in the cell
+  bool lower;   // half of it
+  std::uint64_t corner, above;
+  if (layout_.kind == TessellationKind::kBlocks) {
+    const LatticeBlocks::Block block = LatticeBlocks(n).block(local);
+    GridPlace at = grid_place(u, v, block.cells);
+    // A hit on the third side may be rounded beyond it.
+    const std::uint32_t last = n - 1 - block.i - block.j - at.y;
+    if (at.x > last || (at.x == last && at.u + at.v > 1)) {
+      at.x = last;
+      at.u = 1 - at.v;
+    }
+    i = block.i + at.x;
+    j = block.j + at.y;
+    x = at.u;
+    y = at.v;
+    lower = x + y <= 1.0;
+    corner = std::uint64_t{t.first_vertex} + block.first_vertex + at.y * (block.cells + 1) + at.x;
+    above = corner + block.cells + 1;
+  } else {
+    const RowPlace at = row_place(n, local);
+    i = at.place;
+    j = at.row;
+    x = static_cast<double>(u);
+    y = static_cast<double>(v);
+    lower = u + v <= 1.0f;
+    corner = t.first_vertex + LatticeRows{n}.vertex(i, j);
+    above = corner + (n - j + 1);
+  }
   // The last one of a row is a triangle.
-  const bool lower = u + v <= 1.0f || i + j + 1 == n;
-  const double x = static_cast<double>(u), y = static_cast<double>(v);
-  const std::uint64_t corner = t.first_vertex + std::uint64_t{j} * (n + 1) - std::uint64_t{j} * (j - 1) / 2 + i;
-  const std::uint64_t above = corner + (n - j + 1);
+  lower |= i + j + 1 == n;
   micro.vertex[0] = lower ? corner : above + 1;
   micro.vertex[1] = corner + 1;
   micro.vertex[2] = above;
@@ -496,6 +661,7 @@ struct Tessellation::Around : NearPlanes {
   const Tessellation& tessellation;
   std::uint32_t primitive;  ///< that it is on
   std::uint32_t x, y;       ///< of a grid: its cell
+  std::vector<std::uint32_t> seen{};  ///< blocks; Embree names them once for each box that it has of them
 };
 
 /// Whether a base triangle's vertices run counter-clockwise around its normals, 1, or clockwise, −1.
@@ -522,6 +688,21 @@ bool Tessellation::add_planes_of(RTCPointQueryFunctionArguments* arguments)
   }
   const std::uint32_t n = t.layout_.triangles[triangle].segments;
   const std::uint64_t first = t.grids_[arguments->primID].startVertexID;
+  if (t.layout_.kind == TessellationKind::kBlocks) {
+    if (std::find(around.seen.begin(), around.seen.end(), arguments->primID) != around.seen.end()) return false;
+    around.seen.push_back(arguments->primID);
+    const LatticeBlocks::Block block =
+        LatticeBlocks(n).block(arguments->primID - t.layout_.triangles[triangle].first_primitive);
+    for (std::uint32_t y = 0; y < block.cells; ++y) {
+      for (std::uint32_t x = 0; x < block.cells && block.i + x + block.j + y < n; ++x) {
+        const std::uint64_t a = first + std::uint64_t{y} * (block.cells + 1) + x, b = a + block.cells + 1;
+        if (!around.may_reach({at(a), at(a + 1), at(b), at(b + 1)})) continue;
+        around.add(winding, at(a), at(a + 1), at(b));
+        if (block.i + x + block.j + y + 1 < n) around.add(winding, at(a + 1), at(b + 1), at(b));
+      }
+    }
+    return false;
+  }
   const auto add_cell = [&](std::uint32_t x, std::uint32_t y) {
     const std::uint64_t a = first + std::uint64_t{y} * (n + 1) + x, b = a + n + 1;
     around.add(winding, at(a), at(a + 1), at(b));
@@ -561,6 +742,8 @@ Vec3d Tessellation::leave(RTCScene scene,
     ends[0] = corners[0];
     ends[1] = corners[1];
     ends[2] = corners[3];
+  } else if (layout_.kind == TessellationKind::kBlocks) {
+    std::copy_n(micro_triangle(primitive, u, v).vertex, 3, ends);
   } else {
     const std::uint64_t row = layout_.triangles[hit.triangle].segments + 1;
     ends[0] = grids_[primitive].startVertexID + around.y * row + around.x;

@@ -308,7 +308,7 @@ void Accel::build_tessellated(DisplacementSet& displacements)
     RTCGeometry geometry = tessellation->geometry_make(trees_->device());
     rtcSetGeometryOccludedFilterFunction(geometry, displacements.geometry(d).shadow_filter);
     attach(use.tree.get(), geometry, 0, ~0u);
-    attach_corners(use.tree.get(), use.box, use.pad, tessellation->layout().kind == TessellationKind::kQuads);
+    attach_corners(use.tree.get(), use.box, use.pad, tessellation->geometry_type());
     commit(use.tree.get());
     displacements.geometry(d).scene = use.tree.get();
   }
@@ -387,7 +387,8 @@ void Accel::build_meshes()
       TreePointer tree = trees_->scene_make();
       attach(tree.get(), use.mesh.radius.empty() ? new_mesh(use, nullptr) : new_curves(use.mesh, use.transparent), 0,
              ~0u);
-      attach_corners(tree.get(), use.box, use.pad, !use.pairs.empty());
+      attach_corners(tree.get(), use.box, use.pad,
+                     use.pairs.empty() ? RTC_GEOMETRY_TYPE_TRIANGLE : RTC_GEOMETRY_TYPE_QUAD);
       commit(tree.get());
       return tree;
     });
@@ -784,21 +785,32 @@ RTCGeometry Accel::new_curves(const TreeMesh& mesh, bool transparent)
 }
 
 /// Enlarges a scene's box, by two points that no ray hits.
-/// @param quads  what else is in the scene is quadrilaterals: Embree has a tree for each type, and rays pass all
-void Accel::attach_corners(RTCScene target, const Box3& box, Vec3f pad, bool quads)
+/// @param type  of what else is in the scene, triangles, quadrilaterals or grids: Embree has a tree for each type, and rays pass all
+void Accel::attach_corners(RTCScene target, const Box3& box, Vec3f pad, RTCGeometryType type)
 {
   if (is_zero(pad)) return;
-  const std::uint32_t sides = quads ? 4 : 3;
-  RTCGeometry geometry = rtcNewGeometry(trees_->device(), quads ? RTC_GEOMETRY_TYPE_QUAD : RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* vertices = static_cast<Vec3f*>(
-      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, sizeof(Vec3f), 2));
-  auto* indices = static_cast<std::uint32_t*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0,
-                                                                      quads ? RTC_FORMAT_UINT4 : RTC_FORMAT_UINT3,
-                                                                      sides * sizeof(std::uint32_t), 2));
-  if (vertices == nullptr || indices == nullptr) throw OutOfMemory("the box of a mesh");
-  vertices[0] = box.low - pad;
-  vertices[1] = box.high + pad;
-  for (std::uint32_t i = 0; i < 2 * sides; ++i) indices[i] = i / sides;
+  RTCGeometry geometry = rtcNewGeometry(trees_->device(), type);
+  const auto new_buffer = [&](RTCBufferType buffer, RTCFormat format, std::size_t bytes, std::size_t count) {
+    void* const made = rtcSetNewGeometryBuffer(geometry, buffer, 0, format, bytes, count);
+    if (made == nullptr) throw OutOfMemory("the box of a mesh");
+    return made;
+  };
+  const Vec3f corners[2] = {box.low - pad, box.high + pad};
+  // A grid has four vertices at least.
+  const std::uint32_t sides = type == RTC_GEOMETRY_TYPE_TRIANGLE ? 3 : 4;
+  const bool is_grid = type == RTC_GEOMETRY_TYPE_GRID;
+  const std::uint32_t copies = is_grid ? sides : 1;
+  auto* const vertices =
+      static_cast<Vec3f*>(new_buffer(RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, sizeof(Vec3f), 2 * copies));
+  for (std::uint32_t i = 0; i < 2 * copies; ++i) vertices[i] = corners[i / copies];
+  if (is_grid) {
+    auto* const grids = static_cast<RTCGrid*>(new_buffer(RTC_BUFFER_TYPE_GRID, RTC_FORMAT_GRID, sizeof(RTCGrid), 2));
+    for (std::uint32_t i = 0; i < 2; ++i) grids[i] = {i * sides, 2, 2, 2};
+  } else {
+    auto* const indices = static_cast<std::uint32_t*>(new_buffer(
+        RTC_BUFFER_TYPE_INDEX, sides == 4 ? RTC_FORMAT_UINT4 : RTC_FORMAT_UINT3, sides * sizeof(std::uint32_t), 2));
+    for (std::uint32_t i = 0; i < 2 * sides; ++i) indices[i] = i / sides;
+  }
   attach(target, geometry, 1, 0);
 }
 

@@ -144,7 +144,7 @@ class Accel {
   void set_round_vertices(RTCGeometry geometry, const TreeMesh& mesh);
   RTCGeometry new_mesh(const MeshUse& use, const Affine3* world_from_object);
   void set_corners(RTCGeometry geometry, const MeshUse& use);
-  void attach_corners(RTCScene target, const Box3& box, Vec3f pad, bool quads = false);
+  void attach_corners(RTCScene target, const Box3& box, Vec3f pad, RTCGeometryType type);
   RTCGeometry new_instance(RTCScene instanced, const Affine3& world_from_object);
   Box3 light_box(const Light& light) const;
   RTCGeometry new_rectangle(const Light& light);

@@ -26,8 +26,8 @@ constexpr std::uint64_t kRaysPerCase = 40;
 constexpr HeightFormat kFormats[] = {HeightFormat::kFloat, HeightFormat::kU16, HeightFormat::kFloat, HeightFormat::kU8};
 /// One case in so many is tessellated: building Embree's trees for 40 rays costs more than tracing them.
 constexpr std::uint64_t kTessellatedShare = 10;
-constexpr TessellationKind kKinds[] = {TessellationKind::kQuads, TessellationKind::kGrids};
-constexpr const char* kKindNames[] = {"tessellate", "tessellate-grid"};
+constexpr TessellationKind kKinds[] = {TessellationKind::kQuads, TessellationKind::kGrids, TessellationKind::kBlocks};
+constexpr const char* kKindNames[] = {"tessellate", "tessellate-grid", "blocks"};
 
 /// Prints figures, also of a test that passes: they are what the documentation quotes.
 void report(const std::string& label, const std::string& figures)

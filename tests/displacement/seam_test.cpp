@@ -214,13 +214,13 @@ TEST(SeamWalls, AreOneASideWhereTexturesDiffer)
             0u);
 }
 
+constexpr const char* kTessellationNames[] = {"Quads", "Grids", "Blocks"};
+
 class TessellationOfSeams : public testing::TestWithParam<TessellationKind> {};
 INSTANTIATE_TEST_SUITE_P(Kinds,
                          TessellationOfSeams,
-                         testing::Values(TessellationKind::kQuads, TessellationKind::kGrids),
-                         [](const auto& kind) {
-                           return kind.param == TessellationKind::kQuads ? "Quads" : "Grids";
-                         });
+                         testing::Values(TessellationKind::kQuads, TessellationKind::kGrids, TessellationKind::kBlocks),
+                         [](const auto& kind) { return kTessellationNames[static_cast<int>(kind.param)]; });
 
 TEST_P(TessellationOfSeams, LetsNoRayOut)
 {

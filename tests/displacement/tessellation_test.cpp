@@ -8,6 +8,7 @@
 #include <cmath>
 #include <map>
 #include <random>
+#include <set>
 #include <vector>
 
 #include "displacement/displaced_mesh.h"
@@ -17,7 +18,8 @@ namespace relief {
 namespace {
 
 constexpr double kPi2 = 6.283185307179586;
-constexpr TessellationKind kKinds[] = {TessellationKind::kQuads, TessellationKind::kGrids};
+constexpr TessellationKind kKinds[] = {TessellationKind::kQuads, TessellationKind::kGrids, TessellationKind::kBlocks};
+constexpr const char* kKindNames[] = {"Quads", "Grids", "Blocks"};
 
 /// A displaced mesh with everything that it refers to.
 struct Displaced {
@@ -163,15 +165,48 @@ bool is_hit(const RTCRayHit& ray) { return ray.hit.geomID != RTC_INVALID_GEOMETR
 
 class TessellationOf : public testing::TestWithParam<TessellationKind> {};
 INSTANTIATE_TEST_SUITE_P(Kinds, TessellationOf, testing::ValuesIn(kKinds), [](const auto& kind) {
-  return kind.param == TessellationKind::kQuads ? "Quads" : "Grids";
+  return kKindNames[static_cast<int>(kind.param)];
 });
 
+/// What Embree is given of grids.
+struct GivenGrids {
+  std::vector<RTCGrid> grids;
+  std::vector<Vec3f> vertices;
+
+  explicit GivenGrids(const Tessellation& t)
+  {
+    if (t.layout().kind == TessellationKind::kQuads) return;
+    RTCDevice device = rtcNewDevice(nullptr);
+    RTCGeometry geometry = t.geometry_make(device);
+    const auto* given = static_cast<const RTCGrid*>(rtcGetGeometryBufferData(geometry, RTC_BUFFER_TYPE_GRID, 0));
+    grids.assign(given, given + t.layout().num_primitives);
+    for (std::size_t k = 0; k < t.layout().num_vertices; ++k) vertices.push_back(t.vertex(k));
+    rtcReleaseGeometry(geometry);
+    rtcReleaseDevice(device);
+  }
+
+  /// Calls with the corners of each of Embree's triangles that has an area or may have one.
+  template <typename Add>
+  void for_each_triangle(const Add& add) const
+  {
+    for (const RTCGrid& grid : grids) {
+      for (unsigned y = 0; y + 1 < grid.height; ++y) {
+        for (unsigned x = 0; x + 1 < grid.width; ++x) {
+          const Vec3f *a = &vertices[grid.startVertexID + y * grid.stride + x], *b = a + grid.stride;
+          add(a[0], a[1], b[0]);
+          add(a[1], b[1], b[0]);
+        }
+      }
+    }
+  }
+};
+
 /// Corners of a primitive as Embree counts them: of a micro-triangle, or all of a grid's vertices.
-std::vector<std::array<float, 2>> corners_of(const Tessellation& t, std::uint32_t triangle)
+std::vector<std::array<float, 2>> corners_of(const Tessellation& t, const GivenGrids& given, std::uint32_t primitive)
 {
   if (t.layout().kind == TessellationKind::kQuads) return {{0, 0}, {1, 0}, {0, 1}};
   std::vector<std::array<float, 2>> corners;
-  const auto n = static_cast<int>(t.layout().triangles[triangle].segments);
+  const int n = given.grids[primitive].width - 1;
   for (int y = 0; y <= n; ++y) {
     for (int x = 0; x <= n; ++x) {
       corners.push_back({static_cast<float>(x) / static_cast<float>(n), static_cast<float>(y) / static_cast<float>(n)});
@@ -186,12 +221,13 @@ TEST_P(TessellationOf, VerticesLieOnTheSurfaceAtTheWeightsThatHitsReport)
   make_sphere(d, 7, 5, 3, 64, 0.6, 0.2);
   const DisplacedMeshView mesh = d.mesh.view();
   const Tessellation t(mesh, tessellation_layout_make(mesh, GetParam(), 0.7));
+  const GivenGrids given(t);
   std::uint32_t triangle = 0;
   for (std::uint32_t primitive = 0; primitive < t.layout().num_primitives; ++primitive) {
     while (triangle + 1 < mesh.num_triangles && t.layout().triangles[triangle + 1].first_primitive <= primitive) {
       ++triangle;
     }
-    for (const auto& [u, v] : corners_of(t, triangle)) {
+    for (const auto& [u, v] : corners_of(t, given, primitive)) {
       const MicroHit hit = t.hit(primitive, u, v);
       ASSERT_EQ(hit.triangle, triangle);
       // Between texels S is continuous, so that weights rounded by 1e-7 move it by less than 1e-5.
@@ -215,41 +251,26 @@ TEST_P(TessellationOf, ClosedMeshesStayClosedToTheLastBit)
 
   using Place = std::array<float, 3>;
   std::map<std::pair<Place, Place>, int> runs;
-  const auto add = [&](std::uint64_t a, std::uint64_t b, std::uint64_t c) {
-    Place P[3];
-    for (int k = 0; k < 3; ++k) {
-      const Vec3f v = t.vertex(k == 0 ? a : (k == 1 ? b : c));
-      P[k] = {v.x, v.y, v.z};
-    }
+  const auto add = [&](Vec3f a, Vec3f b, Vec3f c) {
+    const Place P[3] = {{a.x, a.y, a.z}, {b.x, b.y, b.z}, {c.x, c.y, c.z}};
     for (int k = 0; k < 3; ++k) {
       const Place &from = P[k], &to = P[(k + 1) % 3];
       if (from < to) ++runs[{from, to}];
       if (to < from) --runs[{to, from}];
     }
   };
+  GivenGrids(t).for_each_triangle(add);
   for (const TessellatedTriangle& tri : layout.triangles) {
+    if (layout.kind != TessellationKind::kQuads) break;
     const std::uint64_t n = tri.segments;
-    if (layout.kind == TessellationKind::kQuads) {
-      std::uint64_t row = tri.first_vertex;
-      for (std::uint64_t j = 0; j < n; ++j) {
-        const std::uint64_t next = row + n - j + 1;
-        for (std::uint64_t i = 0; i + j < n; ++i) {
-          add(row + i, row + i + 1, next + i);
-          if (i + j + 1 < n) add(row + i + 1, next + i + 1, next + i);
-        }
-        row = next;
+    std::uint64_t row = tri.first_vertex;
+    for (std::uint64_t j = 0; j < n; ++j) {
+      const std::uint64_t next = row + n - j + 1;
+      for (std::uint64_t i = 0; i + j < n; ++i) {
+        add(t.vertex(row + i), t.vertex(row + i + 1), t.vertex(next + i));
+        if (i + j + 1 < n) add(t.vertex(row + i + 1), t.vertex(next + i + 1), t.vertex(next + i));
       }
-      continue;
-    }
-    for (std::uint64_t corner = 0; corner < 3; ++corner) {
-      const std::uint64_t first = tri.first_vertex + corner * (n + 1) * (n + 1);
-      for (std::uint64_t y = 0; y < n; ++y) {
-        for (std::uint64_t x = 0; x < n; ++x) {
-          const std::uint64_t at = first + y * (n + 1) + x;
-          add(at, at + 1, at + n + 1);
-          add(at + 1, at + n + 2, at + n + 1);
-        }
-      }
+      row = next;
     }
   }
   int open = 0;
@@ -320,7 +341,8 @@ double largest_distance(const Displaced& d, TessellationKind kind, double rate)
   double largest = 0;
   for (int k = 0; k < 200'000; ++k) {
     float u = uniform(random), v = uniform(random);
-    if (kind == TessellationKind::kQuads && u + v > 1) {
+    // Of blocks those that cross the third side have nothing beyond it.
+    if (kind != TessellationKind::kGrids && u + v > 1) {
       u = 1 - u;
       v = 1 - v;
     }
@@ -338,7 +360,7 @@ TEST_P(TessellationOf, ConvergesToTheSurface)
   make_patch(d, 2, 32);
   // Where edges follow the texel lines the error falls with the square of the rate; across them, where the surface has
   // creases, with the rate.
-  const double factor = GetParam() == TessellationKind::kQuads ? 3.5 : 1.7;
+  const double factor = GetParam() == TessellationKind::kGrids ? 1.7 : 3.5;
   double previous = largest_distance(d, GetParam(), 1);
   EXPECT_LT(previous, 0.1 * 2 / 32.0);
   for (const double rate : {2.0, 4.0, 8.0}) {
@@ -365,6 +387,82 @@ TEST(Tessellation, SeamsWithDifferentHeightsStayOpen)
     const MicroHit hit = t.hit(primitive, 0, 0);
     EXPECT_LT(length(surface_point(mesh, mesh.triangles[hit.triangle], hit.b1, hit.b2).P - hit.P), 1e-5);
   }
+}
+
+/// Blocks are another order of the same micro-triangles: none is missing, and what is folded has no area. Triangles of 1 to 41
+/// cells a side, so that blocks end at the third side in every way.
+TEST(Tessellation, BlocksHaveTheMicroTrianglesOfQuads)
+{
+  using Place = std::array<float, 9>;
+  for (const double rate : {0.02, 0.1, 0.25, 0.45, 0.7, 1.3}) {
+    Displaced d;
+    make_sphere(d, 9, 6, 4, 64, 0.8, 0.2);
+    const Tessellation quads(d.mesh.view(), tessellation_layout_make(d.mesh.view(), TessellationKind::kQuads, rate));
+    const Tessellation blocks(d.mesh.view(), tessellation_layout_make(d.mesh.view(), TessellationKind::kBlocks, rate));
+    std::multiset<Place> wanted, given;
+    const auto add = [](std::multiset<Place>* to, Vec3f a, Vec3f b, Vec3f c) {
+      if (a == b || b == c || c == a) return;  // also where neighbours have fewer points along a side
+      to->insert({a.x, a.y, a.z, b.x, b.y, b.z, c.x, c.y, c.z});
+    };
+    for (const TessellatedTriangle& tri : quads.layout().triangles) {
+      const std::uint32_t n = tri.segments;
+      const auto at = [&](std::uint32_t i, std::uint32_t j) {
+        std::uint32_t index = tri.first_vertex + i;
+        for (std::uint32_t row = 0; row < j; ++row) index += n + 1 - row;
+        return quads.vertex(index);
+      };
+      for (std::uint32_t j = 0; j < n; ++j) {
+        for (std::uint32_t i = 0; i + j < n; ++i) {
+          add(&wanted, at(i, j), at(i + 1, j), at(i, j + 1));
+          if (i + j + 1 < n) add(&wanted, at(i + 1, j), at(i + 1, j + 1), at(i, j + 1));
+        }
+      }
+    }
+    GivenGrids(blocks).for_each_triangle([&](Vec3f a, Vec3f b, Vec3f c) { add(&given, a, b, c); });
+    EXPECT_EQ(blocks.layout().num_micro_triangles, quads.layout().num_micro_triangles);
+    EXPECT_TRUE(given == wanted) << "rate " << rate << ": " << given.size() << " of " << wanted.size();
+    // Sides are the same points, too.
+    for (std::uint32_t triangle = 0; triangle < d.mesh.view().num_triangles; ++triangle) {
+      for (int k = 0; k < 3; ++k) {
+        const std::vector<SidePoint> a = quads.side(triangle, k), b = blocks.side(triangle, k);
+        ASSERT_EQ(a.size(), b.size());
+        for (std::size_t at = 0; at < a.size(); ++at) {
+          ASSERT_EQ(a[at].fraction, b[at].fraction);
+          ASSERT_TRUE(a[at].P == b[at].P) << "triangle " << triangle << " side " << k << " point " << at;
+        }
+      }
+    }
+  }
+}
+
+/// Rays that pass the third sides of triangles, whose hits may be rounded beyond them: they are on the triangle all the same.
+TEST(Tessellation, HitsOnAThirdSideStayInTheirTriangle)
+{
+  Displaced d;
+  make_sphere(d, 9, 6, 4, 64, 0.8, 0.2);
+  const Tessellation t(d.mesh.view(), tessellation_layout_make(d.mesh.view(), TessellationKind::kBlocks, 0.7));
+  const GivenGrids given(t);
+  std::mt19937 random(9);
+  std::uniform_real_distribution<float> uniform(0, 1);
+  int beyond = 0;
+  for (std::uint32_t primitive = 0; primitive < t.layout().num_primitives; ++primitive) {
+    const auto cells = static_cast<float>(given.grids[primitive].width - 1);
+    for (int k = 0; k < 40; ++k) {
+      // A point of the block, as far along as its row goes and some units in the last place more.
+      const float y = std::floor(uniform(random) * cells) + uniform(random);
+      const MicroHit row_end = t.hit(primitive, 1, y / cells);
+      if (row_end.b1 + row_end.b2 < 1 - 1e-9) continue;
+      ++beyond;
+      for (const float x : {1.0f, 0.999f, (cells - y) / cells, std::nextafter((cells - y) / cells, 2.0f)}) {
+        const MicroHit hit = t.hit(primitive, x, y / cells);
+        ASSERT_GE(hit.b1, -1e-6);
+        ASSERT_GE(hit.b2, -1e-6);
+        if (x > 1 - y / cells + 1e-5f) continue;  // nothing is there to be hit
+        ASSERT_LE(hit.b1 + hit.b2, 1 + 1e-6);
+      }
+    }
+  }
+  EXPECT_GT(beyond, 1000);
 }
 
 TEST(Tessellation, FollowsTheTexelsOfEachTriangle)
@@ -415,6 +513,25 @@ TEST(Tessellation, MemoryIsKnownBeforehand)
       EXPECT_GT(expected, 0.95 * used);
       EXPECT_LT(expected, 1.7 * used);
     }
+  }
+}
+
+/// However many triangles have it: 4 × 4 corners, three points on each of 33 edges, and three in each of 18 triangles.
+TEST(Tessellation, EvaluatesEachPointOnce)
+{
+  Displaced d;
+  make_patch(d, 3, 32);
+  const DisplacedMeshView mesh = d.mesh.view();
+  for (const TessellationKind kind : {TessellationKind::kQuads, TessellationKind::kBlocks}) {
+    std::atomic<int> count{0};
+    TessellationRule rule;
+    rule.segments = [](const DisplacedTriangle&, int) { return 4.0; };
+    rule.height = [&](Vec3d, double x, double y) {
+      ++count;
+      return interpolate_height(*mesh.field, x, y);
+    };
+    const Tessellation t(mesh, tessellation_layout_make(mesh, kind, rule), rule);
+    EXPECT_EQ(count.load(), 16 + 33 * 3 + 18 * 3);
   }
 }
 

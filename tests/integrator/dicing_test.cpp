@@ -12,6 +12,7 @@
 #include "integrator/scene_context.h"
 #include "integrator/trace.h"
 #include "scene/memory.h"
+#include "tests/support/block_cells.h"
 #include "tests/support/render_scene.h"
 #include "tests/support/scene_builder.h"
 
@@ -214,13 +215,10 @@ TEST(Dicing, OfAClosedMeshIsClosed)
   ASSERT_GT(t.layout().triangles.size(), scene.meshes[0].triangles.size());
   std::vector<std::array<float, 6>> sides[2];  // from a lower to a higher end, and those from a higher one
   std::uint64_t num_triangles = 0;
-  const auto add_triangle = [&](std::uint32_t primitive, bool upper) {
+  const auto add_triangle = [&](const std::uint64_t* vertices) {
     ++num_triangles;
     Vec3f corner[3];
-    for (int k = 0; k < 3; ++k) {
-      const float u = k == 1 ? 1.0f : 0.0f, v = k == 2 ? 1.0f : 0.0f;
-      corner[k] = to_float((upper ? t.hit(primitive, 1.0f - u, 1.0f - v) : t.hit(primitive, u, v)).P);
-    }
+    for (int k = 0; k < 3; ++k) corner[k] = t.vertex(vertices[k]);
     for (int k = 0; k < 3; ++k) {
       std::array<float, 3> a{corner[k].x, corner[k].y, corner[k].z};
       const Vec3f& to = corner[(k + 1) % 3];
@@ -231,15 +229,10 @@ TEST(Dicing, OfAClosedMeshIsClosed)
       sides[turned].push_back({a[0], a[1], a[2], b[0], b[1], b[2]});
     }
   };
-  for (const TessellatedTriangle& triangle : t.layout().triangles) {
-    std::uint32_t primitive = triangle.first_primitive;
-    for (std::uint32_t row = triangle.segments; row > 0; --row) {
-      for (std::uint32_t i = 1; i <= row; ++i, ++primitive) {
-        add_triangle(primitive, false);
-        if (i < row) add_triangle(primitive, true);
-      }
-    }
-  }
+  for_each_cell(t, [&](const BlockCell& cell) {
+    add_triangle(cell.lower);
+    if (cell.has_upper) add_triangle(cell.upper);
+  });
   EXPECT_EQ(num_triangles, t.layout().num_micro_triangles);
   for (auto& each : sides) std::sort(each.begin(), each.end());
   std::vector<std::array<float, 6>> open;
@@ -261,21 +254,20 @@ TEST(Dicing, IsAsFineAsThePicture)
     int count = 0;
     const Camera& camera = scene.cameras[0].camera;
     const double scale = 400 / (2.0 * static_cast<double>(camera.half_height));
-    for (std::uint32_t primitive = 0; primitive < t.layout().num_primitives; primitive += 7) {
+    for_each_cell(t, [&](const BlockCell& cell) {
       // On the sphere itself, since heights make sides longer.
       Vec3f corner[2];
       for (int k = 0; k < 2; ++k) {
-        const MicroHit hit = t.hit(primitive, static_cast<float>(k), 0.0f);
-        const Vec3f P = to_float(hit.P);
+        const Vec3f P = t.vertex(cell.lower[k]);
         corner[k] = transform_point(placement, P / length(P));
       }
       const Vec3f middle = 0.5f * (corner[0] + corner[1]) - camera.world_from_camera.p;
-      if (std::max(std::abs(middle.x), std::abs(middle.y)) > -0.4f * middle.z) continue;
+      if (std::max(std::abs(middle.x), std::abs(middle.y)) > -0.4f * middle.z) return;
       const double pixels = scale * static_cast<double>(length(corner[1] - corner[0]) / length(middle));
       longest = std::max(longest, pixels);
       sum += pixels;
       ++count;
-    }
+    });
     ASSERT_GT(count, 1000);
     // Sides of sides are; where a triangle's rows meet a side that has fewer points, they are dragged by up to half a step.
     EXPECT_LT(longest, 1.7 * error) << error;
@@ -311,20 +303,45 @@ TEST(Dicing, FindsTheSurfaceWhereTexelsAreWiderThanPixels)
   }
 }
 
+/// Where no triangle is cut, hits name the mesh's own.
+TEST(Dicing, TakesTheMeshAsItIsWhereNoSideIsLong)
+{
+  const Scene scene = close_sphere(64, 4, 0);
+  const SceneContext exact(scene), diced(scene, options_of(scene, 1, 100));
+  const Tessellation& t = tessellation_of(diced);
+  ASSERT_EQ(t.layout().triangles.size(), scene.meshes[0].triangles.size());
+  std::vector<TraceRay> rays;
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> uniform(-0.3f, 0.3f);
+  for (int i = 0; i < 2000; ++i) {
+    rays.push_back({scene.cameras[0].camera.world_from_camera.p, normalize(Vec3f{uniform(random), uniform(random), -1}),
+                    0, kInfinity});
+  }
+  const std::vector<TraceHit> a = trace_rays(exact, rays), b = trace_rays(diced, rays);
+  int num_same = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    ASSERT_LT(b[i].t, kInfinity);
+    num_same += a[i].triangle_index == b[i].triangle_index && std::abs(a[i].u - b[i].u) < 0.05f ? 1 : 0;
+  }
+  // Heights of coarser levels are met elsewhere at angles.
+  EXPECT_GT(num_same, 1800);
+}
+
 /// Micro-triangles that cross the line between two texels would show.
 TEST(Dicing, ShadesTexelsThatAreWiderThanPixelsAsTheMapHasThem)
 {
   const Scene scene = close_sphere(64, 4, 0);
   const SceneContext exact(scene), diced(scene, options_of(scene, 1, 8000));
-  const std::uint32_t count = static_cast<std::uint32_t>(tessellation_of(diced).layout().num_primitives);
-  int num_shaded = 0;
-  for (std::uint32_t primitive = 0; primitive < count; primitive += 97) {
-    const DisplacedPoint point = diced.displacements.resolve(0, {}, primitive, {0.3f, 0.4f, 0});
-    if (point.level > 0) continue;
+  int num_shaded = 0, num_cells = 0;
+  for_each_cell(tessellation_of(diced), [&](const BlockCell& cell) {
+    if (++num_cells % 97 != 0) return;
+    const DisplacedPoint point =
+        diced.displacements.resolve(0, {}, cell.primitive, {cell.u + 0.3f * cell.side, cell.v + 0.4f * cell.side, 0});
+    if (point.level > 0) return;
     const DisplacedPoint expected = exact.displacements.resolve(0, {}, point.triangle, {point.u, point.v, 0});
-    ASSERT_EQ(point.Ns, expected.Ng) << primitive;
+    EXPECT_EQ(point.Ns, expected.Ng) << cell.primitive;
     ++num_shaded;
-  }
+  });
   EXPECT_GT(num_shaded, 1000);
 }
 
