@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 from scenes import (
     IS_4_0,
+    IS_5_0,
     add_camera,
     add_light,
     add_plane,
@@ -204,7 +205,8 @@ def test_gobo_by_normal():
 
 
 def test_gobo_by_generated():
-    assert_agrees(_gobo(0.0, "Generated"), samples=16)
+    # Since 5.0 in the light's own space: without a size it would be at a corner of squares, whose colour is rounding's to say.
+    assert_agrees(_gobo(0.25 if IS_5_0 else 0.0, "Generated"), samples=16)
 
 
 def test_gobo_projected_by_the_cone():

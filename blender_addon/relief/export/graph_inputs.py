@@ -4,6 +4,8 @@
 One function a kind of node, listed at the end. Each gives the value of one output: a reference, or numbers.
 """
 
+import math
+
 import bpy
 
 from .. import compat
@@ -413,6 +415,46 @@ def _by_normal(kind, names):
     return write
 
 
+def _radial_tiling(g, source):
+    """Radial Tiling of 5.0: the plane in sectors about the origin, each with coordinates across and along its bisector."""
+    node, groups = source.node, source.groups
+    sides, roundness = (g.constant(node.inputs[name], groups) for name in ("Sides", "Roundness"))
+    if sides is None or (sides := max(sides, 2.0)) != math.floor(sides):
+        raise not_understood(node, "sides that vary or are no whole number")
+    if roundness is None or 0.0 < roundness < 1.0:
+        raise not_understood(node, "a roundness other than 0 and 1")
+    half = math.pi / sides
+
+    def op(operation, a, b=0.0):
+        return g.op("math", {"a": a, "b": b}, "value", operation=operation)
+
+    parts = g.add("separate", g.inputs(node, groups, {"Vector": "vector"}))
+    x, y = _output(parts, "x"), _output(parts, "y")
+    turn = op("add", op("arctangent2", y, x), op("multiply", op("less-than", y, 0.0), 2.0 * math.pi))
+    number = op("floor", op("divide", turn, 2.0 * half))
+    name = source.socket.name
+    if name == "Segment ID":
+        return number
+    if name == "Segment Rotation":
+        return op("add", op("multiply", number, 2.0 * half), half)
+    is_round = roundness >= 1.0
+    if name == "Segment Width":
+        return _constant(g, half if is_round else math.tan(half) if sides != 2.0 else 0.0)
+    aside = op("subtract", op("subtract", turn, op("multiply", number, 2.0 * half)), half)
+    length = g.op("vector-math", {"a": g.op("combine", {"x": x, "y": y}, "vector")}, "value", operation="length")
+    if is_round:
+        across, along = op("divide", aside, half) if node.normalize else aside, length
+    else:
+        along = op("multiply", length, op("cosine", aside))
+        is_whole = not node.normalize or sides == 2.0  # whose sectors are half planes, without an end aside
+        across = op("multiply", length, op("sine", aside)) if is_whole else op("divide", op("tangent", aside), math.tan(half))
+    if node.normalize:
+        across = op("add", op("multiply", across, 0.5), 0.5)
+    else:
+        along = op("subtract", along, 1.0)  # from the side of a polygon about the unit circle on
+    return g.op("combine", {"x": across, "y": along}, "vector")
+
+
 #: What gives an output of a node.
 OUTPUTS = {
     "ShaderNodeTexCoord": _texture_coordinate,
@@ -436,6 +478,7 @@ OUTPUTS = {
     "ShaderNodeVolumeInfo": _volume_info,
     "ShaderNodeHairInfo": _hair_info,
     "GeometryNodeInputSceneTime": _scene_time,
+    "ShaderNodeRadialTiling": _radial_tiling,
     "NodeImplicitConversion": _implicit_conversion,
     "ShaderNodePointInfo": _point_info,
     "ShaderNodeBlackbody": _made_color("blackbody", "Temperature"),

@@ -1,4 +1,4 @@
-"""Node trees of Blender 5.0 and up that Cycles never sees as they stand: what repeats, is chosen by a menu or handed around."""
+"""Nodes that came with Blender 5.0 and later. Of what repeats, is chosen by a menu or handed around Cycles sees a plain tree."""
 
 import bpy
 
@@ -176,3 +176,39 @@ def test_what_is_not_understood_keeps_its_name():
     coverage, warnings = try_material(material, scene.relief)
     assert [name for name, _ in coverage.not_understood] == ["2_rays"], coverage
     assert len(warnings) == 1 and 'node "2_rays"' in warnings[0], warnings
+
+
+def test_radial_tiling():
+    """All outputs, of corners and round, normalized or not."""
+    if not IS_5_0:
+        return
+    for sides, roundness, normalize, output in (
+        (5, 0.0, False, "Segment Coordinates"),
+        (6, 0.0, True, "Segment Coordinates"),
+        (2, 0.0, True, "Segment Coordinates"),
+        (3, 1.0, True, "Segment Coordinates"),
+        (4, 1.0, False, "Segment Coordinates"),
+        (7, 0.0, False, "Segment ID"),
+        (5, 0.0, False, "Segment Width"),
+        (5, 1.0, False, "Segment Width"),
+        (8, 0.0, False, "Segment Rotation"),
+    ):
+        scene = _stage()
+        material, tree, shader = _ball()
+        node = tree.nodes.new("ShaderNodeRadialTiling")
+        node.normalize = normalize
+        node.inputs["Sides"].default_value, node.inputs["Roundness"].default_value = sides, roundness
+        shift = tree.nodes.new("ShaderNodeVectorMath")
+        shift.operation, shift.inputs[1].default_value = "ADD", (0.1, 0.03, 0.0)
+        tree.links.new(tree.nodes.new("ShaderNodeTexCoord").outputs["Object"], shift.inputs[0])
+        tree.links.new(shift.outputs[0], node.inputs["Vector"])
+        made = node.outputs[output]
+        if output == "Segment Coordinates":
+            checks = tree.nodes.new("ShaderNodeTexChecker")
+            checks.inputs["Scale"].default_value = 3.3
+            tree.links.new(made, checks.inputs["Vector"])
+            made = checks.outputs["Color"]
+        else:
+            made = _math(tree, "MULTIPLY", made, 0.1)
+        tree.links.new(made, shader.inputs["Base Color"])
+        assert_agrees(scene, runs=4, samples=24)
