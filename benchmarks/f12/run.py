@@ -37,7 +37,7 @@ _RELMSE_FLOOR = 0.01  # as in exporters/image_metrics.h
 _REFERENCE_SEEDS = (1001, 1002)
 _BLOCK = 16  # pixels a side of the blocks whose means are compared
 _MOST_SAMPLES = 4096  # Blender's default, where a threshold ends the render
-_MODULES = {"usual": ("scenes.py", "more_scenes.py"), "inside": ("inside_scenes.py",)}  # of scenes, by the words for all of them
+_MODULES = {"usual": ("scenes.py", "more_scenes.py"), "inside": ("inside_scenes.py",), "new": ("new_scenes.py",)}  # of scenes, by the words for all of them
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Scenes of the kinds that people make, each a function without arguments that builds it in the open file.
 
-With Blender's default settings. Volumes, subsurface scattering and hair are in inside_scenes.py.
+With Blender's default settings. Volumes, subsurface scattering and hair are in inside_scenes.py, what only Blender 4 and 5 have in new_scenes.py.
 
     blender -b --factory-startup --addons relief --python benchmarks/f12/scenes.py -- FOLDER [SCENE…]
 
@@ -19,6 +19,7 @@ sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
 
 import inside_scenes  # noqa: E402
 import more_scenes  # noqa: E402
+import new_scenes  # noqa: E402
 import stage  # noqa: E402
 from stage import NodeTree  # noqa: E402
 
@@ -257,6 +258,7 @@ def car():
 SCENES = {f.__name__: f for f in (monkeys, still_life, room, lamps, doughnuts, landscape, pavilion, pebbles, neon, car)}
 SCENES |= more_scenes.SCENES
 SCENES |= inside_scenes.SCENES
+SCENES |= new_scenes.SCENES
 
 
 def main(folder, names):

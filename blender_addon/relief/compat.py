@@ -142,6 +142,9 @@ BUMP_WIDTH = 0.1 if IS_5_0 else 1.0
 #: Up to 3.5 Bump nodes themselves bend normals back until the viewer is reflected above the surface; then closures alone do.
 BUMP_REFLECTS_ABOVE = bpy.app.version < (3, 6, 0)
 
+#: Since 5.0 a negative power of 0 is 0; before, without end.
+NEGATIVE_POWERS_OF_0_ARE_0 = IS_5_0
+
 #: Before 4 the Hue/Saturation node cut whole turns off towards 0, so that hues below 0 stayed below.
 HUE_GOES_ROUND = IS_4_0
 

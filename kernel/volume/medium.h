@@ -6,17 +6,12 @@
 #include <cstdint>
 
 #include "kernel/state/medium_state.h"
-#include "kernel/volume/henyey_greenstein.h"
+#include "kernel/volume/phase.h"
 
 namespace relief {
 
 /// Phase functions that one medium has at most.
 inline constexpr int kMostPhases = 4;
-
-struct Phase {
-  Vec3f sigma_s;  ///< 1/m
-  float g = 0;    ///< within ±kMostAnisotropy
-};
 
 struct Medium {
   Vec3f sigma_t;   ///< 1/m; not less than what the phases scatter
@@ -69,7 +64,7 @@ RELIEF_KERNEL PhaseEval media_eval(const MediaSum& sum, Vec3f D, Vec3f wi)
   for (int m = 0; m < sum.size; ++m) {
     for (int i = 0; i < sum.media[m]->num_phases; ++i) {
       const Phase& phase = sum.media[m]->phases[i];
-      const float pdf = henyey_greenstein_pdf(cosine, phase.g), share = scattering_share(phase.sigma_s);
+      const float pdf = phase_pdf(phase, cosine), share = scattering_share(phase.sigma_s);
       eval.f += phase.sigma_s * pdf;
       eval.pdf += share * pdf;
       shares += share;
@@ -90,11 +85,11 @@ RELIEF_KERNEL Vec3f media_sample(const MediaSum& sum, Vec3f D, Vec2f u)
       const float share = scattering_share(phase.sigma_s);
       if (!(share > 0.0f)) continue;
       chosen = &phase;
-      if (left < share) return henyey_greenstein_sample(D, phase.g, {min(left / share, 1.0f - 0x1p-24f), u.y});
+      if (left < share) return phase_sample(phase, D, {min(left / share, 1.0f - 0x1p-24f), u.y});
       left -= share;
     }
   }
-  return henyey_greenstein_sample(D, chosen->g, {u.x, u.y});
+  return phase_sample(*chosen, D, {u.x, u.y});
 }
 
 }  // namespace relief

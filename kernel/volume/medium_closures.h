@@ -4,8 +4,12 @@
 #include <span>
 
 #include "kernel/volume/absorption_volume.h"
+#include "kernel/volume/draine_volume.h"
 #include "kernel/volume/emission_volume.h"
+#include "kernel/volume/fournier_forand_volume.h"
+#include "kernel/volume/mie_volume.h"
 #include "kernel/volume/principled_volume.h"
+#include "kernel/volume/rayleigh_volume.h"
 #include "kernel/volume/scatter_volume.h"
 
 namespace relief {

@@ -1,4 +1,4 @@
-// Volume Scatter.
+// Volume Scatter by the phase function of Henyey and Greenstein.
 #pragma once
 
 #include "kernel/volume/volume_inputs.h"
@@ -15,17 +15,14 @@ struct ScatterVolume {
 
 RELIEF_KERNEL void medium_add(ScatterVolume, float weight, VolumeNumbers& in, Medium& medium)
 {
-  const Vec3f color = in.color();
-  const Vec3f sigma_s = max(color, Vec3f{}) * (weight * max(in.number(), 0.0f));
-  medium.sigma_t += sigma_s;
+  const Vec3f sigma_s = medium_add_scattering(weight, in, medium);
   medium_add_phase(medium, sigma_s, in.number());
 }
 
 template <typename Bounds>
 RELIEF_KERNEL void rate_add(ScatterVolume, float weight, Bounds& in, MediumRate& rate)
 {
-  const ValueBounds color = in.color();
-  rate.sigma_t += bounds_product(color.high, bounds_product(weight, in.number().high));
+  rate_add_scattering(weight, in, rate);
 }
 
 }  // namespace relief

@@ -21,11 +21,24 @@ struct VolumeNumbers {
   }
 };
 
+/// An anisotropy that phase functions can have.
+RELIEF_KERNEL float limited_anisotropy(float g) { return clamp(g, -kMostAnisotropy, kMostAnisotropy); }
+
 /// Adds what scatters.
 /// @param sigma_s  1/m
 RELIEF_KERNEL void medium_add_phase(Medium& medium, Vec3f sigma_s, float anisotropy)
 {
-  medium.phases[medium.num_phases++] = {sigma_s, clamp(anisotropy, -kMostAnisotropy, kMostAnisotropy)};
+  medium.phases[medium.num_phases++] = {sigma_s, limited_anisotropy(anisotropy)};
+}
+
+/// Reads the color and the density of what scatters and does nothing else, and adds that to what light is taken away.
+/// @return  1/m
+RELIEF_KERNEL Vec3f medium_add_scattering(float weight, VolumeNumbers& in, Medium& medium)
+{
+  const Vec3f color = in.color();
+  const Vec3f sigma_s = max(color, Vec3f{}) * (weight * max(in.number(), 0.0f));
+  medium.sigma_t += sigma_s;
+  return sigma_s;
 }
 
 /// Bounds on a number, or on all of a colour's.
@@ -44,5 +57,13 @@ struct MediumRate {
   float sigma_t = 0;  ///< 1/m: the largest channel is not more
   bool emits = false;
 };
+
+/// A bound on what medium_add_scattering adds.
+template <typename Bounds>
+RELIEF_KERNEL void rate_add_scattering(float weight, Bounds& in, MediumRate& rate)
+{
+  const ValueBounds color = in.color();
+  rate.sigma_t += bounds_product(color.high, bounds_product(weight, in.number().high));
+}
 
 }  // namespace relief

@@ -25,7 +25,7 @@ std::vector<VolumeClosureSpec> volume_closures_read(const JsonReader& reader,
     const auto kind = static_cast<VolumeClosureKind>(r.choice("type", kChoices, 0));
     phases += volume_closure_visit(kind, [](auto type) { return type.kPhases; });
     if (phases > kMostPhases) {
-      r.fail("", "at most " + std::to_string(kMostPhases) + " closures that scatter", "one that is too many");
+      r.fail("", "at most " + std::to_string(kMostPhases) + " phase functions", "one that is too many");
     }
     const GraphValue given_weight = input(r, "weight", GraphType::kNumber);
     const GraphScalar weight = given_weight.v[0].index >= 0 ? given_weight.v[0] : build.constant(1.0f);

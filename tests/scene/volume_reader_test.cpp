@@ -61,6 +61,25 @@ TEST(VolumeReader, ClosuresSumToAMedium)
   EXPECT_EQ(medium.phases[0].g, -0.5f);
 }
 
+TEST(VolumeReader, PhaseFunctionsOfOneMedium)
+{
+  const Scene scene = volume_load({{"closures",
+                                    {{{"type", "rayleigh"}, {"color", {1, 1, 1}}},
+                                     {{"type", "draine"}, {"color", {1, 1, 1}}, {"anisotropy", 0.3}, {"alpha", 0.7}},
+                                     {{"type", "mie"}, {"color", {1, 1, 1}}, {"diameter", 12}}}}});
+  const Medium& medium = scene.media.at(0);
+  ASSERT_EQ(medium.num_phases, 4);
+  expect_near(medium.sigma_t, {3, 3, 3});
+  EXPECT_EQ(medium.phases[0].kind, PhaseKind::kDraine);
+  EXPECT_EQ(medium.phases[0].shape, 1.0f);
+  EXPECT_EQ(medium.phases[1].g, 0.3f);
+  EXPECT_EQ(medium.phases[1].shape, 0.7f);
+  expect_near(medium.phases[2].sigma_s + medium.phases[3].sigma_s, {1, 1, 1});
+  EXPECT_EQ(medium.phases[2].kind, PhaseKind::kHenyeyGreenstein);
+  EXPECT_GT(medium.phases[2].g, 0.9f);
+  EXPECT_THROW(volume_load({{"closures", {{{"type", "mie"}}, {{"type", "mie"}}, {{"type", "scatter"}}}}}), SceneError);
+}
+
 TEST(VolumeReader, DefaultsAreBlenders)
 {
   const Scene scene = volume_load({{"closures", {{{"type", "principled"}}}}});

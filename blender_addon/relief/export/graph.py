@@ -576,7 +576,24 @@ _OPERATIONS = {
 def _math(g, node, groups):
     operation = _OPERATIONS.get(node.operation, _label(node.operation))
     inputs = {name: g.value(socket, groups) for name, socket in zip("abc", node.inputs) if socket.enabled}
+    if operation == "power" and compat.NEGATIVE_POWERS_OF_0_ARE_0:
+        inputs["b"] = _exponent(g, "math", "value", inputs)
     return g.add("math", inputs, operation=operation, clamp=node.use_clamp or None)
+
+
+def _exponent(g, kind, output, inputs):
+    """The exponent of a power whose base is inputs["a"], without its sign where that is 0: 0 is the power then."""
+    exponent = inputs["b"]
+    numbers = exponent if isinstance(exponent, list) else [exponent]
+    if not isinstance(exponent, dict) and min(numbers) >= 0:
+        return exponent
+
+    def op(operation, a, b=None):
+        return g.op(kind, {"a": a} if b is None else {"a": a, "b": b}, output, operation=operation)
+
+    ones = [1.0] * 3 if kind == "vector-math" else 1.0
+    is_zero = op("subtract", ones, op("absolute", op("sign", inputs["a"])))
+    return op("add", exponent, op("multiply", is_zero, op("subtract", op("absolute", exponent), exponent)))
 
 
 def _vector_math(g, node, groups):
@@ -584,6 +601,8 @@ def _vector_math(g, node, groups):
     inputs = {name: g.value(socket, groups) for name, socket in zip("abc", node.inputs) if socket.enabled}
     if node.operation in {"SCALE", "REFRACT"}:
         inputs["scale"] = g.value(node.inputs["Scale"], groups)
+    if operation == "power":  # which came with 5.0
+        inputs["b"] = _exponent(g, "vector-math", "vector", inputs)
     return g.add("vector-math", inputs, operation=operation)
 
 

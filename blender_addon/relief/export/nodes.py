@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import bpy
 
+from .. import compat
 from . import color_space
 
 
@@ -184,6 +185,8 @@ def is_used(output):
 
 def _power(base, exponent):
     """What is no number, Blender takes for 0; what is too large, for infinite."""
+    if base == 0 and exponent < 0 and compat.NEGATIVE_POWERS_OF_0_ARE_0:
+        return 0.0
     try:
         result = base**exponent
     except (OverflowError, ZeroDivisionError):

@@ -24,7 +24,17 @@ _NODES = {
     "ShaderNodeVolumeAbsorption": "absorption",
     "ShaderNodeVolumeScatter": "scatter",
     "ShaderNodeVolumePrincipled": "principled",
+    "ShaderNodeVolumeCoefficients": "coefficients",
     "ShaderNodeEmission": "emission",
+}
+
+#: Closures that scatter and what tells of their phase functions, by Blender's names: since 4.3 a node can have any of them.
+_PHASES = {
+    "HENYEY_GREENSTEIN": ("scatter", {"Anisotropy": "anisotropy"}),
+    "RAYLEIGH": ("rayleigh", {}),
+    "DRAINE": ("draine", {"Anisotropy": "anisotropy", "Alpha": "alpha"}),
+    "FOURNIER_FORAND": ("fournier-forand", {"IOR": "ior", "Backscatter": "backscatter"}),
+    "MIE": ("mie", {"Diameter": "diameter"}),
 }
 
 
@@ -55,8 +65,12 @@ class VolumeWriter(ClosureWriter):
             if kind is None:
                 self._fail(part, f'node "{node.name}" ({node.bl_label}) as volume', "it is left out")
                 continue
-            if getattr(node, "phase", "HENYEY_GREENSTEIN") != "HENYEY_GREENSTEIN":
-                self.unread(part, f"the phase function {node.phase}", "Henyey and Greenstein's was used")
+            if kind == "coefficients":
+                self._add_coefficients(part, weight)
+                continue
+            if kind == "scatter":
+                self._add_scattering(part, weight, self.inputs(part, {"Color": "color", "Density": "density"}))
+                continue
             inputs = self.inputs(part, _NAMES)
             if kind == "principled" and self._voxels is not None:
                 self._add_attributes(node, inputs)
@@ -65,6 +79,34 @@ class VolumeWriter(ClosureWriter):
             if kind == "principled" and compat.MIXES_WEIGH_VOLUME_EMISSION:
                 self._weigh_emission(inputs, weight)
             self.add(kind, weight, **inputs)
+
+    def _add_scattering(self, source, weight, values):
+        """Adds what scatters by the phase function of a node.
+
+        @param  values  color and density
+        """
+        kind, names = _PHASES[getattr(source.node, "phase", "HENYEY_GREENSTEIN")]
+        self.add(kind, weight, **values, **self.inputs(source, names))
+
+    def _add_coefficients(self, source, weight):
+        """Volume Coefficients, which came with 5.0: what is absorbed, scattered and emitted, each by numbers a metre."""
+        names = {"Absorption Coefficients": "absorbed", "Scatter Coefficients": "scattered", "Emission Coefficients": "emitted"}
+        values = self.inputs(source, names)
+        nothing = [0.0, 0.0, 0.0]
+        if values["scattered"] != nothing:
+            self._add_scattering(source, weight, {"color": values["scattered"]})
+        if values["emitted"] != nothing:
+            self.add("emission", weight, color=values["emitted"])
+        if values["absorbed"] == nothing:
+            return
+        if isinstance(values["absorbed"], dict):
+            color = self.graph.op("vector-math", {"a": [1.0] * 3, "b": values["absorbed"]}, "vector", operation="subtract")
+            self.add("absorption", weight, color=color)
+            return
+        # Relative to the largest, as 1 less a small number would lose its digits.
+        largest = max(values["absorbed"])
+        if largest > 0:
+            self.add("absorption", weight, color=[1.0 - c / largest for c in values["absorbed"]], density=largest)
 
     def fill(self):
         """What Cycles fills a volume object with that has no material: a new Principled Volume."""
