@@ -64,11 +64,12 @@ class ExrFile final : public ImageFile {
  public:
   ExrFile(const std::string& file, std::span<const unsigned char> encoded)
   {
+    // Where the table of rows is missing, they are looked for: images that Blender 5.2 packs have none.
     if (file.empty()) {
       stream_.emplace(encoded);
-      input_.emplace(*stream_, Imf::globalThreadCount(), false);
+      input_.emplace(*stream_, Imf::globalThreadCount(), true);
     } else {
-      input_.emplace(file.c_str(), Imf::globalThreadCount(), false);
+      input_.emplace(file.c_str(), Imf::globalThreadCount(), true);
     }
     const Imf::Header& header = input_->header(0);
     const bool is_flat = !header.hasType() || header.type() == Imf::SCANLINEIMAGE || header.type() == Imf::TILEDIMAGE;

@@ -197,6 +197,50 @@ TEST(ExrFile, WhatIsNoneIsLeftToOpenImageIo)
   EXPECT_EQ(exr_file_make("", magic), nullptr);
 }
 
+/// Zeroes in place of the table that says where each row or tile begins, as Blender 5.2 leaves them in images that it packs.
+/// @param num  entries, behind which the first row begins
+std::vector<unsigned char> without_table(std::vector<unsigned char> bytes, std::size_t num)
+{
+  for (std::size_t at = 0; at + 8 * num < bytes.size(); ++at) {
+    std::uint64_t first;
+    std::memcpy(&first, &bytes[at], sizeof first);
+    if (first != at + 8 * num) continue;
+    std::memset(&bytes[at], 0, 8 * num);
+    return bytes;
+  }
+  ADD_FAILURE() << "no table";
+  return bytes;
+}
+
+TEST(ExrFile, WithoutItsTableTheRowsAreFound)
+{
+  const test::TemporaryFolder folder;
+  const std::string path = (folder / "a.exr").string();
+  constexpr std::size_t kTiles = ((kWidth + 15) / 16) * ((kHeight + 15) / 16);
+  for (const auto& [c, num] :
+       {std::pair{ExrCase{.channels = kRgba, .type = Imf::FLOAT, .compression = Imf::NO_COMPRESSION},
+                  std::size_t{kHeight}},
+        std::pair{ExrCase{.channels = kRgba}, std::size_t{(kHeight + 15) / 16}},
+        std::pair{ExrCase{.channels = kRgba, .tile = 16}, kTiles}}) {
+    exr_write(path, c);
+    const std::vector<unsigned char> whole = bytes_of(path), bare = without_table(whole, num);
+    const std::string bare_path = folder.write("bare.exr", std::string(bare.begin(), bare.end())).string();
+    std::vector<float> rows[3];
+    for (int k = 0; k < 3; ++k) {
+      const std::unique_ptr<ImageFile> file =
+          k == 2 ? exr_file_make(bare_path, {}) : exr_file_make("", k == 0 ? whole : bare);
+      ASSERT_NE(file, nullptr);
+      ImageHeader header;
+      ASSERT_EQ(file->open("a.exr", k == 0 ? whole : bare, header), "");
+      rows[k].resize(std::size_t{kWidth} * kHeight * 4);
+      EXPECT_EQ(file->read_rows(0, kHeight, 0, 4, SampleType::kFloat, reinterpret_cast<unsigned char*>(rows[k].data())),
+                "");
+    }
+    EXPECT_EQ(rows[0], rows[1]);
+    EXPECT_EQ(rows[0], rows[2]);
+  }
+}
+
 TEST(ExrFile, RowsThatAreMissingAreAnError)
 {
   const test::TemporaryFolder folder;
