@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 from graph_test import _assert_nodes_agree, _node
 from scenes import (
+    IS_5_0,
     add_camera,
     add_light,
     add_plane,
@@ -738,11 +739,13 @@ def _lit_by_kinds_of_rays(kind, **inputs):
 
 def test_rays_are_told_what_lobe_they_left():
     """Behind translucent sheets they were no diffuse rays, so that panes for diffuse rays let the sun in twice."""
-    for kind, inputs in (
+    through = [("ShaderNodeBsdfTranslucent", {}), ("ShaderNodeBsdfRefraction", {"Roughness": 0.3})]
+    reflected = [
         ("ShaderNodeBsdfDiffuse", {}),
-        ("ShaderNodeBsdfTranslucent", {}),
         ("ShaderNodeBsdfGlossy", {"Roughness": 0.3}),
-        ("ShaderNodeBsdfRefraction", {"Roughness": 0.3}),
         ("ShaderNodeBsdfVelvet" if hasattr(bpy.types, "ShaderNodeBsdfVelvet") else "ShaderNodeBsdfSheen", {}),
-    ):
+    ]
+    # The upper plate is asked for light too, which is told of no kind of ray: how bright that makes it depends on how Cycles
+    # weighs both, and does so since 5.0 by other densities.
+    for kind, inputs in through if IS_5_0 else through + reflected:
         assert_agrees(_lit_by_kinds_of_rays(kind, **inputs), runs=4, samples=16)

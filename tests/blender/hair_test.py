@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 
 from scenes import (
+    IS_5_0,
     add_camera,
     add_light,
     add_plane,
@@ -44,10 +45,14 @@ def _grow(material, count=300, length=0.5, shape="THICK", **settings):
     return ball
 
 
+#: Tubes are half a per cent brighter than in Cycles of 5.2: docs/blender.md.
+_TUBES = 0.012 if IS_5_0 else 0.0
+
+
 def test_tubes():
     scene = _stage()
     _grow(diffuse((0.7, 0.4, 0.2)))
-    assert_agrees(scene, samples=16)
+    assert_agrees(scene, samples=16, tolerance=_TUBES)
 
 
 def test_ribbons():
@@ -158,7 +163,7 @@ def test_principled_hair():
         for name, value in values.items():
             node.inputs[name].default_value = value
         _grow(material)
-        assert_agrees(scene, samples=64)
+        assert_agrees(scene, samples=64, tolerance=_TUBES)
 
 
 def _huang(**values):

@@ -6,6 +6,7 @@ import bpy
 import numpy as np
 
 from scenes import (
+    IS_5_0,
     IS_5_2,
     add_camera,
     add_light,
@@ -113,7 +114,8 @@ def test_normals_are_bumped():
     axes = [f"Normal.{axis}" for axis in "XYZ"]
     _assert_blocks_agree("use_pass_normal", axes, 0.01, stage=_bumped_stage)
     axes = [f"Denoising Normal.{axis}" for axis in "XYZ"]
-    _assert_blocks_agree("denoising_store_passes", axes, 0.02, owner="cycles", stage=_bumped_stage)
+    # Since 5.0 Cycles' are other ones by up to .1: docs/blender.md.
+    _assert_blocks_agree("denoising_store_passes", axes, 0.12 if IS_5_0 else 0.02, owner="cycles", stage=_bumped_stage)
 
 
 def test_position():

@@ -3,11 +3,13 @@
 import bpy
 
 from scenes import (
+    IS_5_0,
     add_camera,
     add_group_socket,
     add_light,
     add_plane,
     add_sphere,
+    agreement,
     assert_agrees,
     degrees,
     new_material,
@@ -79,10 +81,14 @@ def test_balls_with_an_attribute():
 
 
 def test_balls_of_glass():
-    """Rays enter them and never leave."""
+    """Rays enter them and never leave. Since 5.0 Cycles' do, and its balls are darker: docs/blender.md."""
     scene = _scene(6)
     scene.relief.caustics = "off"
     _cloud(new_material("glass", "ShaderNodeBsdfGlass", Roughness=0.2)[0])
+    if IS_5_0:
+        _, brighter = agreement(scene, samples=64)
+        assert 0.04 < brighter < 0.08, brighter
+        return
     assert_agrees(scene, samples=64)
 
 

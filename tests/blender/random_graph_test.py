@@ -10,7 +10,7 @@ import os
 import graph_test
 import numpy as np
 import random_graphs
-from scenes import add_camera, folder, new_scene, render
+from scenes import IS_5_0, add_camera, folder, new_scene, render
 
 #: Graphs that are rendered at once; each has so many of the sheet's rows.
 GRAPHS_A_SHEET = 20
@@ -20,6 +20,10 @@ _TOLERANCE = 1e-4
 
 #: Share of points that may be off: at jumps.
 _MOST_OFF = 0.01
+
+#: Difference of the median point that is allowed besides. Since 5.0 numbers that are made of colours are luminances of primaries
+#: that differ by .03 % (docs/blender.md), and textures make more of it.
+_MOST_MEDIAN = 2e-4 if IS_5_0 else 0.0
 
 
 @dataclasses.dataclass
@@ -34,7 +38,7 @@ class Result:
     def judgement(self):
         if self.error:
             return "not exported"
-        return "agrees" if self.off <= _MOST_OFF else "differs"
+        return "agrees" if self.off <= _MOST_OFF or self.median < _MOST_MEDIAN else "differs"
 
     def __str__(self):
         numbers = f"{self.num_nodes} nodes, {self.off:.3%} of points off, median {self.median:.1g}, spread {self.spread:.2g}"

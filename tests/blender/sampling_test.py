@@ -4,6 +4,7 @@ import bpy
 import numpy as np
 
 from scenes import (
+    IS_5_0,
     add_camera,
     add_light,
     add_plane,
@@ -144,6 +145,10 @@ def test_light_passes_as_many_surfaces_as_in_cycles():
 def test_behind_one_more_surface_paths_see_what_shines():
     for count in (3, 4, 5, 6):
         relief, cycles = _under_sheets(count, True, shines=True)
+        # Since 5.0 it is not one more: docs/blender.md.
+        if count == 5 and IS_5_0:
+            assert cycles == 0 and relief > 0, (relief, cycles)
+            continue
         # Cycles ends such paths by chance.
         assert abs(relief - cycles) <= 0.02 * cycles, (count, relief, cycles)
         assert (cycles > 0) == (count <= 5), (count, cycles)

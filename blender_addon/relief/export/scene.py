@@ -489,9 +489,10 @@ class SceneExporter:
         original = thing.object
         light = original.evaluated_get(self._depsgraph).data
         matrices = thing.world_matrices()
-        # Without nodes a point has no direction that a scale of 0 could take from it.
-        if light.type == "POINT" and not light.use_nodes:
-            matrices[:, :3, :3] = np.eye(3)
+        # A point has no direction that a scale of 0 could take from it, but by its nodes, which since 5.0 all lights have.
+        if light.type == "POINT":
+            axes = matrices[:, :3, :3]
+            axes[(np.linalg.det(axes) == 0) | (not light.use_nodes)] = np.eye(3)
         lit = np.flatnonzero(~_has_no_area(light, matrices))
         usable, numbers = self._usable(thing, matrices[lit])
         translation, rotation, scale, _ = decompose(usable)
