@@ -53,6 +53,15 @@ struct MicrofacetFresnel {
   return {1, 1, 1};
 }
 
+/// The share by which samples of a dielectric are reflected.
+/// @param F  mixture_fresnel of the same
+RELIEF_KERNEL float reflected_chance(const MicrofacetFresnel& f, Vec3f F, float cos_d)
+{
+  // A film may reflect fifty times what is below it does, which samples would have to make up for.
+  const bool has_film = f.kind == MixtureFresnel::kFilmOnDielectric || f.kind == MixtureFresnel::kThinFilm;
+  return has_film ? clamp((F.x + F.y + F.z) * (1.0f / 3.0f), 0.0f, 1.0f) : fresnel_dielectric_at(cos_d, f.eta);
+}
+
 /// @param cos_d  between either direction and the microfacet, >= 0
 [[gnu::always_inline]] RELIEF_KERNEL Vec3f mixture_fresnel(const MicrofacetFresnel& f, float cos_d)
 {

@@ -27,16 +27,16 @@ lobe_eval(const MicrofacetGlass& glass, const LobeHit& hit, const BsdfTables&, V
     const AnisotropicAlpha alpha{glass.alpha, glass.alpha};
     const float f = glass.is_beckmann ? beckmann_eval({alpha, SmithMasking::kCorrelated}, hit.wo, wi, &pdf)
                                       : ggx_anisotropic_eval({alpha, SmithMasking::kCorrelated}, hit.wo, wi, &pdf);
-    const float chance = fresnel_dielectric_at(cos_d, eta);
-    return {glass.reflection_tint * mixture_fresnel(hit.fresnel, cos_d) * f, chance * pdf};
+    const Vec3f F = mixture_fresnel(hit.fresnel, cos_d);
+    return {glass.reflection_tint * F * f, reflected_chance(hit.fresnel, F, cos_d) * pdf};
   }
   const MicrofacetRefraction refraction{glass.alpha, eta, glass.is_beckmann, SmithMasking::kCorrelated, false};
   const float f = microfacet_refraction_eval(refraction, hit.wo, wi, &pdf);
   const Vec3f h = hit.wo + eta * wi;
   const float cos_o = min(1.0f, __builtin_fabsf(dot(hit.wo, h)) / length(h));
-  const Vec3f transmittance = splat3(1.0f) - mixture_fresnel(hit.fresnel, cos_o);
-  return {glass.transmission_tint * max(transmittance, Vec3f{}) * (f * transmission_scale<kMode>(eta)),
-          (1.0f - fresnel_dielectric_at(cos_o, eta)) * pdf};
+  const Vec3f F = mixture_fresnel(hit.fresnel, cos_o);
+  return {glass.transmission_tint * max(splat3(1.0f) - F, Vec3f{}) * (f * transmission_scale<kMode>(eta)),
+          (1.0f - reflected_chance(hit.fresnel, F, cos_o)) * pdf};
 }
 
 /// Rough or smooth. @param u_branch  [0, 1): between reflection and refraction
@@ -52,7 +52,8 @@ lobe_sample(const MicrofacetGlass& glass, const LobeHit& hit, float u_branch, Ve
                                        : ggx_anisotropic_visible_normal(alpha, wo, u);
   const float cos_o = min(1.0f, dot(wo, wm));
   if (!(cos_o > 0.0f)) return {};
-  const float chance = fresnel_dielectric_at(cos_o, eta);
+  const Vec3f F = mixture_fresnel(hit.fresnel, cos_o);
+  const float chance = reflected_chance(hit.fresnel, F, cos_o);
   const bool reflects = u_branch < chance;
   Vec3f wi;
   if (reflects) {
@@ -63,7 +64,6 @@ lobe_sample(const MicrofacetGlass& glass, const LobeHit& hit, float u_branch, Ve
     wi = normalize(refract(wo, wm, cos_o, refracted_cosine(cos_o, eta), eta));
   }
   LobeSample s;
-  const Vec3f F = mixture_fresnel(hit.fresnel, cos_o);
   if (!hit.is_delta) {
     s = lobe_sample_glossy(wi, !reflects, glass.alpha);
   } else if (reflects) {

@@ -150,6 +150,11 @@ std::vector<MixtureCase> cases()
     const auto distribution = i < 2 ? ClosureDistribution::kGgx : ClosureDistribution::kMultiscatterGgx;
     all.push_back(case_of_52("Principled 5.2, " + std::to_string(i), spec_of_52(distribution), in));
   }
+  GlassInputs bubble;
+  bubble.roughness = 0.5f;
+  bubble.ior = 1.1f;
+  bubble.thin_film_thickness = 420.0f;
+  all.push_back(case_of_52("glass under a film", spec_of_52(), bubble));
   for (const bool is_physical : {false, true}) {
     MetallicInputs metal;
     metal.thin_film_thickness = 400.0f;
@@ -354,6 +359,33 @@ double furnace(const Mixture& m, LobeSides sides = LobeSides::kBoth)
     if (s.pdf > 0.0f && counts) sum += static_cast<double>(max_component(s.f) * __builtin_fabsf(s.wi.z) / s.pdf);
   }
   return sum / kSamples;
+}
+
+// Glass of an index of 1.1 reflects .2 %, its film up to some 15 %: what is reflected is as bright as what is not.
+TEST(Mixture, WhatAFilmOnGlassReflectsIsSampledAsOften)
+{
+  for (const float roughness : {0.0f, 0.3f}) {
+    GlassInputs bubble;
+    bubble.roughness = roughness;
+    bubble.ior = 1.1f;
+    bubble.thin_film_thickness = 420.0f;
+    bubble.thin_film_ior = 1.4f;
+    const MixtureCase one = case_of_52("", spec_of_52(), bubble);
+    int num_reflected = 0;
+    for (const float z : {0.5f, 1.0f}) {
+      MixtureLobes lobes;
+      const Mixture m = mixture_make(one, direction(z, 0.2f), lobes);
+      TestRandom random(3);
+      for (int i = 0; i < 2000; ++i) {
+        const float u_branch = random.next(), u = random.next();
+        const BsdfSample s = closure_sample<kFeatureAll>(m, tables(), u_branch, {u, random.next()});
+        if (!(s.pdf > 0.0f) || s.wi.z < 0.0f) continue;
+        ++num_reflected;
+        EXPECT_LT(mean_component(s.f) * s.wi.z / s.pdf, 1.3f) << roughness << " " << z;
+      }
+    }
+    EXPECT_GT(num_reflected, 100) << roughness;
+  }
 }
 
 TEST(Mixture, TheLayeredPrincipledReflectsNoMoreThanItReceives)
