@@ -225,6 +225,18 @@ TessellationLayout tessellation_layout_least(const DisplacedMeshView& mesh, Tess
   return layout;
 }
 
+TessellationLayout tessellation_layout_as(TessellationKind kind, const TessellationLayout& layout)
+{
+  TessellationLayout other;
+  other.kind = kind;
+  other.edge_owner = layout.edge_owner;
+  other.corner_owner = layout.corner_owner;
+  divide_triangles(
+      static_cast<std::uint32_t>(layout.triangles.size()),
+      [&](std::uint32_t edge) { return layout.triangles[edge / 3].edge_segments[edge % 3]; }, &other);
+  return other;
+}
+
 std::uint64_t tessellation_peak_bytes(const TessellationLayout& layout, const TessellationBuild& build)
 {
   // Peaks of Embree 3.13.5 beside its inputs, on flat and wavy meshes of .05 to 9 million micro-triangles: 62 to 74 bytes for

@@ -75,6 +75,9 @@ TessellationLayout tessellation_layout_make(const DisplacedMeshView& mesh, Tesse
 /// @cost    24 bytes a base triangle; nothing is compared or sorted
 TessellationLayout tessellation_layout_least(const DisplacedMeshView& mesh, TessellationKind kind, double rate);
 
+/// The same triangles with as many segments, in another order.
+TessellationLayout tessellation_layout_as(TessellationKind kind, const TessellationLayout& layout);
+
 /// Bytes in use while Embree builds the tree: vertices, indices, the tree and what building needs besides.
 /// @source measured, see the definition
 std::uint64_t tessellation_peak_bytes(const TessellationLayout& layout, const TessellationBuild& build);

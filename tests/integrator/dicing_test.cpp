@@ -79,8 +79,6 @@ TEST(Dicing, LetsNoRayOut)
 {
   const Scene scene = close_sphere(512, 32, 0.1);
   // With parts of triangles, and levels from the map's own on.
-  const SceneContext context(scene, options_of(scene, 1, 600));
-  ASSERT_GT(tessellation_of(context).layout().triangles.size(), scene.meshes[0].triangles.size());
   std::mt19937 random(3);
   std::normal_distribution<float> normal;
   std::vector<TraceRay> rays;
@@ -89,7 +87,17 @@ TEST(Dicing, LetsNoRayOut)
     if (length(O) > 0.8f) continue;
     rays.push_back({O, normalize(Vec3f{normal(random), normal(random), normal(random)}), 0, kInfinity});
   }
-  for (const TraceHit& hit : trace_rays(context, rays)) ASSERT_LT(hit.t, 3.0f);
+  // Few rays a micro-triangle, and many.
+  for (const auto& [num_rays, kind] :
+       {std::pair(3e6, TessellationKind::kBlocks), std::pair(1e9, TessellationKind::kQuads)}) {
+    DisplacementOptions options = options_of(scene, 1, 600);
+    options.num_rays = num_rays;
+    const SceneContext context(scene, options);
+    const TessellationLayout& layout = tessellation_of(context).layout();
+    ASSERT_EQ(layout.kind, kind) << layout.num_micro_triangles;
+    ASSERT_GT(layout.triangles.size(), scene.meshes[0].triangles.size());
+    for (const TraceHit& hit : trace_rays(context, rays)) ASSERT_LT(hit.t, 3.0f);
+  }
 }
 
 /// Paths within a closed surface that is dark, in a bright world: whatever light they find has leaked.
@@ -210,8 +218,11 @@ TEST(Dicing, OfAClosedMeshIsClosed)
   Scene scene = close_sphere(512, 32, 0.1);
   // Texture coordinates are cut around the poles.
   scene.displacements[0].weld_seams = true;
-  const SceneContext context(scene, options_of(scene, 1, 400));
+  DisplacementOptions options = options_of(scene, 1, 400);
+  options.num_rays = 3e6;
+  const SceneContext context(scene, options);
   const Tessellation& t = tessellation_of(context);
+  ASSERT_EQ(t.layout().kind, TessellationKind::kBlocks);
   ASSERT_GT(t.layout().triangles.size(), scene.meshes[0].triangles.size());
   std::vector<std::array<float, 6>> sides[2];  // from a lower to a higher end, and those from a higher one
   std::uint64_t num_triangles = 0;

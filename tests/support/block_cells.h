@@ -1,4 +1,4 @@
-// The micro-triangles of a tessellation in blocks, as Embree has them.
+// The micro-triangles of a diced mesh, in blocks or as quadrilaterals, as Embree has them.
 #pragma once
 
 #include "displacement/tessellation_lattice.h"
@@ -18,6 +18,17 @@ template <typename Visit>
 void for_each_cell(const Tessellation& tessellation, const Visit& visit)
 {
   for (const TessellatedTriangle& t : tessellation.layout().triangles) {
+    if (tessellation.layout().kind == TessellationKind::kQuads) {
+      const LatticeRows rows{t.segments};
+      std::uint32_t primitive = t.first_primitive;
+      for (std::uint32_t j = 0; j < t.segments; ++j) {
+        for (std::uint32_t i = 0; i + j < t.segments; ++i, ++primitive) {
+          const std::uint64_t a = t.first_vertex + rows.vertex(i, j), b = t.first_vertex + rows.vertex(i, j + 1);
+          visit(BlockCell{primitive, 0, 0, 1, {a, a + 1, b}, {a + 1, b + 1, b}, i + j + 1 < t.segments});
+        }
+      }
+      continue;
+    }
     const LatticeBlocks blocks(t.segments);
     for (std::uint32_t k = 0; k < blocks.num_blocks(); ++k) {
       const LatticeBlocks::Block block = blocks.block(k);
