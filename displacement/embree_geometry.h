@@ -139,7 +139,7 @@ struct DisplacedPoint {
   Vec3f P = {}, Ng = {};       ///< on the traced surface, object space; Ng unit, on the side of the displacement normal
   Vec3f Ns = {};               ///< unit shading normal, object space: Ng, or that of the smoothed map
   Vec3f leave = {};            ///< see SurfaceHit::leave; object space
-  TriangleLift lift = {};  ///< world; 0: the surface is traced as it is, there is no smoother one
+  TriangleLift lift = {};      ///< world; 0: the surface is traced as it is, there is no smoother one
   float level = 0;             ///< of the map; above 0 it stands for facets of finer texels, see level_facets.h
 };
 

@@ -414,7 +414,8 @@ PhotonChoice photon_choice_make(const SceneContext& context,
   PhotonSources pilots = choice.sources;
   pilots.factors = pilot_factors(context, pilots, settings);
   const auto run = [&](const PhotonSources& sources, double paths, std::uint64_t seed) {
-    return pilot_run(context, options, g, sources, static_cast<std::uint32_t>(paths), paths / kPilotSamples, seed, stop);
+    return pilot_run(context, options, g, sources, static_cast<std::uint32_t>(paths), paths / kPilotSamples, seed,
+                     stop);
   };
   // As many photons as a small picture has show what there is.
   constexpr double kFewest = 1 << 14;
@@ -457,7 +458,7 @@ PhotonChoice photon_choice_make(const SceneContext& context,
   if (choice.error_ratio > choice.cost_ratio && choice.error_ratio < kClear * choice.cost_ratio) {
     const Pilot second = run(pilots, whole, ~g.seed);
     pilot.photon_error = 0.5 * (pilot.photon_error + second.photon_error);
-    without = pilot.seen_error + std::sqrt(pilot.caustic_error * second.caustic_error);
+    without = pilot.seen_error + std::min(pilot.caustic_error, second.caustic_error);
     compare(seen_error);
   }
   if (choice.error_ratio <= choice.cost_ratio) {

@@ -18,7 +18,7 @@ struct SurfaceHit {
   Vec2f uv[2];    ///< texture coordinates; (0, 0) where absent
   Vec4f color{1, 1, 1, 1};
   float area_ratio[2] = {0, 0};  ///< √(uv area / world area) of the triangle: uv units a metre, for texture footprints
-  TriangleLift lift{};  ///< see triangle_lift; 0 for flat meshes
+  TriangleLift lift{};           ///< see triangle_lift; 0 for flat meshes
   Vec3f leave{};  ///< how rays' origins are moved to the front side, metres; 0: along Ng, by P_error
   Vec3f clear{};  ///< how they are moved first, along the triangle: see triangle_clearance
 };

@@ -8,8 +8,9 @@ namespace relief {
 
 /// Where a smooth surface lies that a triangle's normals suggest, seen from one of its points: along a vector, world, metres.
 struct TriangleLift {
-  Vec3f N{};                        ///< mean of the vertices' normals, not unit
-  float front = 0.0f, back = 0.0f;  ///< how far along it, for rays on the side of N (0 or more) and on the other (0 or less)
+  Vec3f N{};  ///< mean of the vertices' normals, not unit
+  float front = 0.0f,
+        back = 0.0f;  ///< how far along it, for rays on the side of N (0 or more) and on the other (0 or less)
 };
 
 /// See TriangleLift. @tparam F  float, or lanes of it
@@ -36,10 +37,10 @@ RELIEF_KERNEL LiftHeights<F> triangle_lift(F w, F u, F v, V edge1, V edge2, V n0
   const F up01 = dot(edge1, n0), up02 = dot(edge2, n0), up10 = -dot(edge1, n1), up12 = dot(edge12, n1);
   const F up20 = -dot(edge2, n2), up21 = -dot(edge12, n2);
   const F up0 = u * up01 + v * up02, up1 = w * up10 + v * up12, up2 = w * up20 + u * up21;
-  const F above = min(min(max(max(up01, up02) - up0, -up0), max(max(up10, up12) - up1, -up1)),
-                      max(max(up20, up21) - up2, -up2));
-  const F below = min(min(max(up0 - min(up01, up02), up0), max(up1 - min(up10, up12), up1)),
-                      max(up2 - min(up20, up21), up2));
+  const F above =
+      min(min(max(max(up01, up02) - up0, -up0), max(max(up10, up12) - up1, -up1)), max(max(up20, up21) - up2, -up2));
+  const F below =
+      min(min(max(up0 - min(up01, up02), up0), max(up1 - min(up10, up12), up1)), max(up2 - min(up20, up21), up2));
   const F half_bulge = -0.5f * (w * u * (up01 + up10) + u * v * (up12 + up21) + v * w * (up20 + up02));
   return {max(max(above, zero), half_bulge), min(-max(below, zero), half_bulge)};
 }
