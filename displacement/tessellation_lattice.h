@@ -102,7 +102,7 @@ class LatticeBlocks {
   static constexpr std::uint32_t kCells = 8;
 
   /// @param n  cells a side of the lattice, > 0
-  explicit LatticeBlocks(std::uint32_t n) : n_(n), side_((n + kCells - 1) / kCells), last_(n - kCells * (side_ - 1)) {}
+  explicit LatticeBlocks(std::uint32_t n) : side_((n + kCells - 1) / kCells), last_(n - kCells * (side_ - 1)) {}
 
   struct Block {
     std::uint32_t i, j;          ///< of its first vertex
@@ -144,7 +144,7 @@ class LatticeBlocks {
             (index - row) * vertices_in(kCells) + row * vertices_in(last_)};
   }
 
-  std::uint32_t n_, side_, last_;
+  std::uint32_t side_, last_;
 };
 
 }  // namespace relief

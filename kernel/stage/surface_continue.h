@@ -62,8 +62,9 @@ RELIEF_KERNEL void shade_surface_continue(const KernelGlobals& g,
   if (!(bsdf.pdf > 0.0f)) return;
   const Vec3f wi = from_local(side.frame, bsdf.wi);
   const bool transmitted = (bsdf.lobe & kLobeTransmit) != 0;
-  // As closures are sampled.
-  if (!at.material->has_closures && !transmitted && dot(wi, side.Ng) < 0.0f) return;
+  // As closures are sampled: ribbons are shaded as if they were round.
+  const bool is_curve = (at.instance->flags & kCurves) != 0;
+  if (!at.material->has_closures && !transmitted && !is_curve && dot(wi, side.Ng) < 0.0f) return;
   bool is_diffuse_alone = false, is_sharp = (bsdf.lobe & kLobeDelta) != 0;
   if constexpr ((kFeatures & kFeatureMixture) == 0) {
     const std::uint32_t without = path_does_without(g, state.flags[path]);

@@ -461,7 +461,9 @@ TEST(Dicing, IsDecidedOnceForASequence)
   DisplacementOptions far = options_of(scene, 1, 200), near = far;
   far.camera->world_from_camera.p = {0, 0, 3};
   const SceneContext alone(scene, near);
-  near.auto_bytes = tessellation_peak_bytes(tessellation_of(alone).layout(), kRenderTessellation) * 13 / 10;
+  // Enough for blocks, which take the least.
+  const TessellationLayout blocks = tessellation_layout_as(TessellationKind::kBlocks, tessellation_of(alone).layout());
+  near.auto_bytes = tessellation_peak_bytes(blocks, kRenderTessellation) * 13 / 10;
   far.auto_bytes = near.auto_bytes;
   EXPECT_EQ(SceneContext(scene, near).displacements.method_names(), "tessellate");
   near.choices = far.choices = std::make_shared<DicingChoices>();

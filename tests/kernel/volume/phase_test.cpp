@@ -60,7 +60,7 @@ TEST(PhaseFunctions, ScatterAllOfTheLight)
         phase.kind == PhaseKind::kFournierForand
             ? fournier_forand_share(sin2, static_cast<double>(phase.g), static_cast<double>(phase.shape))
             : 0.0;
-    EXPECT_NEAR(ahead + integrate(sin2, 1, [&](double c) { return pdf(phase, c); }), 1.0, 2e-4) << name;
+    EXPECT_NEAR(ahead + integrate(sin2, 1, [&, p = phase](double c) { return pdf(p, c); }), 1.0, 2e-4) << name;
   }
 }
 
@@ -122,7 +122,7 @@ TEST(PhaseFunctions, AShareOfTheLightGoesNearerToStraightOnThanASample)
       const Vec3f way{0, 0, 1};
       const double cosine = static_cast<double>(phase_sample(phase, way, {u, 0.3f}).z);
       if (cosine > 0.99999) continue;  // where floats of cosines end
-      const double rest = integrate(0.5 * (1.0 - cosine), 1, [&](double c) { return pdf(phase, c); });
+      const double rest = integrate(0.5 * (1.0 - cosine), 1, [&, p = phase](double c) { return pdf(p, c); });
       EXPECT_NEAR(1.0 - rest, static_cast<double>(u), 2e-3) << name;
     }
   }
