@@ -154,11 +154,7 @@ RELIEF_KERNEL LightGroups light_groups_eval(const LightsView& view, Vec3f P, con
       !(groups.sun_sum + groups.finite_root.sum > view.environment_yields_to)) {
     environment = environment_irradiance_eval(view.environment_irradiance, at.N);
     if (const LightGloss& gloss = at.gloss; gloss.share > 0.0f) {
-      const bool is_even = !view.environment.has_map;
-      const float shown = is_even ? 0.0f : environment_irradiance_eval(view.environment_irradiance, gloss.R);
-      // What follows a metal's lobe finds an even sky without noise, which asking for it would bring.
-      const float share = is_even && gloss.share == kMostGlossShare ? 1.0f : gloss.share;
-      environment += share * (shown - environment);
+      environment += gloss.share * (environment_irradiance_eval(view.environment_irradiance, gloss.R) - environment);
     }
   }
   const float sum = environment + groups.sun_sum + groups.finite_root.sum;
