@@ -258,12 +258,15 @@ def car():
 SCENES = {f.__name__: f for f in (monkeys, still_life, room, lamps, doughnuts, landscape, pavilion, pebbles, neon, car)}
 SCENES |= more_scenes.SCENES
 SCENES |= inside_scenes.SCENES
-SCENES |= new_scenes.SCENES
+if bpy.app.version >= (5, 0, 0):
+    SCENES |= new_scenes.SCENES
 
 
 def main(folder, names):
     stage.folder = os.path.abspath(folder)
     for name in names or SCENES:
+        if name not in SCENES:
+            sys.exit(f"{name}: Blender {bpy.app.version_string} cannot make this scene, which needs 5.0 or later")
         SCENES[name]()
         bpy.ops.wm.save_as_mainfile(filepath=os.path.join(stage.folder, f"{name}.blend"))
 
