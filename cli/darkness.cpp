@@ -40,8 +40,7 @@ bool emission_shows(const Scene& scene, std::size_t camera)
   options.settings.noise_threshold = 0;
   options.settings.caustics.mode = CausticsMode::kOff;
   options.camera = scene.cameras[camera].camera;
-  options.camera.half_width = options.camera.half_height * static_cast<float>(options.settings.width) /
-                              static_cast<float>(options.settings.height);
+  camera_fit(options.camera, static_cast<float>(options.settings.width), static_cast<float>(options.settings.height));
   const std::atomic<bool> stop{false};
   Statistics stats;
   const Darkness darkness = darkness_of(render(scene, options, stop, {}, stats).view);

@@ -36,7 +36,7 @@ Camera camera_for_image(const SceneCamera& chosen, const PictureOptions& options
     }
     camera.half_height = static_cast<float>(std::tan(options.fov * std::numbers::pi / 360));
   }
-  camera.half_width = camera.half_height * static_cast<float>(width) / static_cast<float>(height);
+  camera_fit(camera, static_cast<float>(width), static_cast<float>(height));
   return camera;
 }
 

@@ -81,7 +81,7 @@ double picture_share(const MeshView& mesh, std::span<const Affine3> places, cons
 
 double box_share(const MeshView& mesh, std::span<const Affine3> places, const PictureView& view)
 {
-  const double width = view.height * view.camera.half_width / view.camera.half_height;
+  const double width = view.height * view.camera.half_width / (view.camera.half_height * view.camera.pixel_aspect);
   Box3 box = box_empty();
   for (std::uint32_t i = 0; i < mesh.num_vertices; ++i) box = box_union(box, {mesh.P[i], mesh.P[i]});
   double share = 0;

@@ -116,7 +116,12 @@ class PictureView {
     return pixels_in_plane(distance_to_line(to_eye - dot(to_eye, back_) * back_, along - dot(along, back_) * back_));
   }
   /// Of a perspective camera, in the middle of its picture; of an orthographic one pixels a metre.
-  double pixels_a_radian() const { return height / (2.0 * static_cast<double>(camera.half_height)); }
+  /// By the shorter side of pixels that are not square.
+  double pixels_a_radian() const
+  {
+    const double side = std::min(static_cast<double>(camera.pixel_aspect), 1.0);
+    return height / (2.0 * static_cast<double>(camera.half_height) * side);
+  }
   /// Of an orthographic camera, at a distance from its axis: as in the picture for as far around as it is wide, and then less.
   double pixels_in_plane(double distance) const
   {

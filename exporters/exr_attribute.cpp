@@ -30,12 +30,13 @@ struct NamedKind {
 
 /// Numbers are doubles: seeds do not fit into OpenEXR's integers.
 constexpr NamedKind kKinds[] = {
-    {"worldToCamera", Kind::kMatrix},          {"worldToNDC", Kind::kMatrix},
-    {"utcOffset", Kind::kFloat},               {"relief:seed", Kind::kNumber},
-    {"relief:frame", Kind::kInteger},          {"relief:samples", Kind::kNumber},
-    {"relief:seconds", Kind::kNumber},         {"relief:threads", Kind::kInteger},
-    {"relief:error_rmse", Kind::kNumber},      {"relief:error_relmse", Kind::kNumber},
-    {"relief:denoise_seconds", Kind::kNumber}, {"relief:denoised_rmse", Kind::kNumber},
+    {"worldToCamera", Kind::kMatrix},        {"worldToNDC", Kind::kMatrix},
+    {"pixelAspectRatio", Kind::kFloat},      {"utcOffset", Kind::kFloat},
+    {"relief:seed", Kind::kNumber},          {"relief:frame", Kind::kInteger},
+    {"relief:samples", Kind::kNumber},       {"relief:seconds", Kind::kNumber},
+    {"relief:threads", Kind::kInteger},      {"relief:error_rmse", Kind::kNumber},
+    {"relief:error_relmse", Kind::kNumber},  {"relief:denoise_seconds", Kind::kNumber},
+    {"relief:denoised_rmse", Kind::kNumber},
 };
 
 /// Up to here doubles count in ones; beyond, text says more.
@@ -136,6 +137,8 @@ std::optional<std::string> exr_attribute_text(const std::string& name, const Imf
   if (const auto* integer = dynamic_cast<const Imf::IntAttribute*>(&attribute)) return std::to_string(integer->value());
   if (const auto* number = dynamic_cast<const Imf::DoubleAttribute*>(&attribute)) return shortest_text(number->value());
   if (const auto* number = dynamic_cast<const Imf::FloatAttribute*>(&attribute)) {
+    // All files have this one.
+    if (name == "pixelAspectRatio" && number->value() == 1) return {};
     return attribute_number(static_cast<double>(number->value()));
   }
   if (const auto* matrix = dynamic_cast<const Imf::M44fAttribute*>(&attribute)) return matrix_text(matrix->value());

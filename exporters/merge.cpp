@@ -427,9 +427,8 @@ MergeResult Merger::finish()
   // What remains describes the joined render; what was true of one of its parts only (threads, command, …) goes.
   const Attributes first = std::move(result_.attributes);
   result_.attributes.clear();
-  for (const char* kept :
-       {"software", "capDate", "utcOffset", "worldToCamera", "worldToNDC", "relief:version", "relief:scene", "relief:frame",
-        "relief:view", "relief:warnings"}) {
+  for (const char* kept : {"software", "capDate", "utcOffset", "worldToCamera", "worldToNDC", "pixelAspectRatio",
+                           "relief:version", "relief:scene", "relief:frame", "relief:view", "relief:warnings"}) {
     if (const auto found = first.find(kept); found != first.end() && !found->second.empty())
       result_.attributes.insert(*found);
   }

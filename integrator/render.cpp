@@ -70,6 +70,7 @@ KernelGlobals render_globals(const SceneContext& context, const RenderOptions& o
       sample_log2_stream(settings.noise_threshold > 0 ? std::min(least_samples(settings), planned) : planned);
   g.full_width = settings.width;
   g.full_height = settings.height;
+  g.pixel_size = std::sqrt(options.camera.pixel_aspect) / static_cast<float>(settings.height);
   const FilmWindow window = render_window(options);
   g.crop_x = window.x0;
   g.crop_y = window.y0;

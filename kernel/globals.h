@@ -73,6 +73,7 @@ struct KernelGlobals {
   Camera camera;
   MotionView camera_motion;  ///< of `camera`, which stands where it is when the shutter is half done
   Vec3f camera_forward;      ///< unit, world: the axis that depths are measured along
+  float pixel_size = 1;      ///< side of a square as large as a pixel, as a fraction of the image's height
   BounceLimits limits;
   float clamp_direct = 0, clamp_indirect = 0;  ///< 0: off
   float filter_glossy = 0;                     ///< see path_blur; 0: off

@@ -30,7 +30,7 @@ SceneCamera perspective(const char* name, const Affine3& frame, double half_heig
   out.name = name;
   out.camera.world_from_camera = frame;
   out.camera.half_height = static_cast<float>(half_height);
-  out.camera.half_width = out.camera.half_height * image_aspect;
+  camera_fit(out.camera, image_aspect, 1);
   out.camera.focus_distance = static_cast<float>(distance);
   return out;
 }

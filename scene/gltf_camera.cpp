@@ -37,7 +37,7 @@ SceneCamera gltf_camera(const GltfDocument& document,
     }
     out.aspect = half_width / camera.half_height;
   }
-  camera.half_width = camera.half_height * (out.aspect > 0 ? out.aspect : image_aspect);
+  camera_fit(camera, out.aspect > 0 ? out.aspect : image_aspect, 1);
   relief_camera(document, node.camera, camera, out.shutter, warnings);
   return out;
 }

@@ -226,10 +226,20 @@ RenderSettings relief_render(const GltfDocument& document, Warnings& warnings)
 
 void relief_camera(const GltfDocument& document, int camera_index, Camera& camera, Shutter& shutter, Warnings& warnings)
 {
+  constexpr int kMostBlades = 1000;
+  constexpr double kMostTurns = 1e4;  // radians, of which the kernel takes sines in single precision
   const auto index = static_cast<std::size_t>(camera_index);
   const std::string path = "/cameras/" + std::to_string(index);
   document.read_extension(document.element("cameras", index), path, "RELIEF_camera", [&](const JsonReader& r) {
+    camera.pixel_aspect = r.number_f("pixelAspect", 1, 1e-3, 1e3);
+    camera.half_width *= camera.pixel_aspect;
     camera.aperture_radius = r.number_f("apertureRadius", 0, 0, kFarthest);
+    camera.aperture_blades = static_cast<int>(r.integer("apertureBlades", 0, 0, kMostBlades));
+    camera.aperture_rotation = r.number_f("apertureRotation", 0, -kMostTurns, kMostTurns);
+    camera.aperture_ratio = r.number_f("apertureRatio", 1, 1e-6, 1e6);
+    if (!(camera.aperture_radius / camera.aperture_ratio <= kFarthest)) {
+      r.fail("apertureRatio", "an aperture within 1e15 m");
+    }
     camera.focus_distance = r.number_f("focusDistance", 1, 1e-6, kNoLimit);
     const float reach = camera.projection == Projection::kPerspective
                             ? camera.focus_distance * max(1.0f, max(camera.half_width, camera.half_height))

@@ -115,12 +115,16 @@ def build_camera(gltf, node, matrix):
     data.lens = 12.0 / math.tan(camera["perspective"]["yfov"] / 2)
     if lens.get("shift", [0, 0]) != [0, 0] or "clip" in lens:
         raise Unsupported("camera shift or clipping")
+    if "pixelAspect" in lens:
+        raise Unsupported("pixels that are not square")
     data.clip_start, data.clip_end = 1e-4, 1e6
     radius = lens.get("apertureRadius", 0)
     if radius > 0:
         data.dof.use_dof = True
         data.dof.focus_distance = lens.get("focusDistance", 1)
         data.dof.aperture_fstop = data.lens * 1e-3 / (2 * radius)
+        data.dof.aperture_blades, data.dof.aperture_rotation = lens.get("apertureBlades", 0), lens.get("apertureRotation", 0)
+        data.dof.aperture_ratio = lens.get("apertureRatio", 1)
     bpy.context.scene.camera = _add_object("camera", data, matrix)
 
 

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from . import exr, report, result, session
-from .export.camera import camera_json
+from .export.camera import Frame, camera_json
 from .export.motion import Motion, shutter_of
 from .export.scene import DATA_FOLDER, StoredMeshes, View, export_scene, write_view
 from .export.settings import denoiser_of, sampling_of, warn_unread_settings
@@ -258,13 +258,12 @@ def view_of(engine, depsgraph, warnings):
         raise ReliefError(f'the scene looks through "{camera.name}", which is not a camera')
     matrix = engine.camera_model_matrix(camera)
     render = scene.render
-    if render.pixel_aspect_x != render.pixel_aspect_y:
-        warnings.warn(f'scene "{scene.name}"', "pixels that are not square", "square ones were used")
     width = int(render.resolution_x * render.resolution_percentage / 100)
     height = int(render.resolution_y * render.resolution_percentage / 100)
     distance = focus_distance(camera, camera.matrix_world, depsgraph)
     shift = (engine.camera_shift_x(camera), camera.data.shift_y)
-    lens = camera_json(camera.data, shift, (width, height), distance, lambda *t: warnings.warn(f'camera "{camera.name}"', *t))
+    frame = Frame(width, height, render.pixel_aspect_x / render.pixel_aspect_y)
+    lens = camera_json(camera.data, shift, frame, distance, lambda *t: warnings.warn(f'camera "{camera.name}"', *t))
     view = View(lens, [list(row) for row in matrix], (width, height))
     if not render.use_border:
         return view, None

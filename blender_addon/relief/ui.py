@@ -629,7 +629,8 @@ class RELIEF_PT_camera_dof(_CameraPanel, bpy.types.Panel):
         if compat.IS_5_0:  # before, it picks what the pointer is over without being told what for
             pick = row.operator("ui.eyedropper_depth", icon="EYEDROPPER", text="")
             pick.prop_data_path = "scene.camera.data.dof.focus_distance"
-        rows.prop(dof, "aperture_fstop")
+        for name in ("aperture_fstop", "aperture_blades", "aperture_rotation", "aperture_ratio"):
+            rows.prop(dof, name)
 
 
 _classes = (

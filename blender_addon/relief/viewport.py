@@ -278,5 +278,5 @@ def _view(context, depsgraph):
     camera = lens_json(is_orthographic, 1 / projection[1, 1], size[0] / size[1], shift.tolist(), clip)
     if has_camera:
         distance = final.focus_distance(looks_through.evaluated_get(depsgraph), looks_through.matrix_world, depsgraph)
-        camera["extensions"]["RELIEF_camera"].update(aperture(lens, distance, lambda *_: None))
+        camera["extensions"]["RELIEF_camera"].update(aperture(lens, distance))
     return View(camera, matrix.tolist(), size)

@@ -14,11 +14,16 @@ struct CameraRay {
 
 /// Ray through a point of the image.
 /// @param film_x, film_y  position in the full image, 0…1, from the left and from the top
-/// @param lens            point on the unit disk
-/// @param pixel_height    height of a pixel as a fraction of the image's
+/// @param world_from_camera  at the ray's time
+/// @param lens            point of the aperture, see aperture_sample
+/// @param pixel_size      side of a square as large as a pixel, as a fraction of the image's height
 /// @source thin lens: pbrt-v4 §5.2.3
-RELIEF_KERNEL CameraRay
-camera_ray_make(const Camera& camera, float film_x, float film_y, Vec2f lens, float pixel_height)
+RELIEF_KERNEL CameraRay camera_ray_make(const Camera& camera,
+                                        const Affine3& world_from_camera,
+                                        float film_x,
+                                        float film_y,
+                                        Vec2f lens,
+                                        float pixel_size)
 {
   const float x = (2.0f * (film_x + camera.shift_x) - 1.0f) * camera.half_width;
   const float y = (1.0f - 2.0f * (film_y - camera.shift_y)) * camera.half_height;
@@ -33,17 +38,17 @@ camera_ray_make(const Camera& camera, float film_x, float film_y, Vec2f lens, fl
   direction = normalize(direction);
 
   CameraRay ray;
-  ray.O = transform_point(camera.world_from_camera, origin);
-  const Vec3f world_direction = transform_vector(camera.world_from_camera, direction);
+  ray.O = transform_point(world_from_camera, origin);
+  const Vec3f world_direction = transform_vector(world_from_camera, direction);
   const float stretch = length(world_direction);
   ray.D = world_direction / stretch;
   // −z per metre of the ray turns depths along the axis into distances along D.
   const float depth_per_distance = -direction.z / stretch;
   ray.t_min = camera.clip_start / depth_per_distance;
   ray.t_max = camera.clip_end / depth_per_distance;
-  const float pixel_size = 2.0f * camera.half_height * pixel_height;
-  ray.cone_width = perspective ? 0.0f : pixel_size;
-  ray.cone_spread = perspective ? pixel_size : 0.0f;
+  const float pixel_in_window = 2.0f * camera.half_height * pixel_size;
+  ray.cone_width = perspective ? 0.0f : pixel_in_window;
+  ray.cone_spread = perspective ? pixel_in_window : 0.0f;
   return ray;
 }
 

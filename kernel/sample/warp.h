@@ -43,6 +43,40 @@ RELIEF_KERNEL Vec2f warp_disk_inverse(Vec2f p)
 /// @return per unit area
 RELIEF_KERNEL constexpr float warp_disk_pdf() { return kInvPi; }
 
+/// Point of a regular polygon whose corners lie on the unit circle; +x goes through the middle of an edge. A walk along all
+/// edges by u.x and out from the centre by u.y: no step where a corner is passed.
+/// @param num_corners  ≥ 3
+RELIEF_KERNEL Vec2f warp_polygon(Vec2f u, int num_corners)
+{
+  const auto n = static_cast<float>(num_corners);
+  const float at = u.x * n;
+  const float edge = min(__builtin_floorf(at), n - 1.0f);
+  const float radius = __builtin_sqrtf(u.y);
+  const SinCos half = sin_cos_turn(0.5f / n), turn = sin_cos_turn(edge / n);
+  const float x = radius * half.cos, y = radius * half.sin * (2.0f * (at - edge) - 1.0f);
+  return {turn.cos * x - turn.sin * y, turn.sin * x + turn.cos * y};
+}
+
+/// @param p  of the polygon
+RELIEF_KERNEL Vec2f warp_polygon_inverse(Vec2f p, int num_corners)
+{
+  const auto n = static_cast<float>(num_corners);
+  const float edge = __builtin_floorf(std::atan2(p.y, p.x) * (0.5f * kInvPi) * n + 0.5f);
+  const SinCos half = sin_cos_turn(0.5f / n), turn = sin_cos_turn(edge / n);
+  const float radius = (turn.cos * p.x + turn.sin * p.y) / half.cos;
+  const float across = radius > 0.0f ? (turn.cos * p.y - turn.sin * p.x) / (radius * half.sin) : 0.0f;
+  const float at = (edge < 0.0f ? edge + n : edge) + 0.5f * (across + 1.0f);
+  return {at / n, sqr(radius)};
+}
+
+/// @return per unit area
+RELIEF_KERNEL float warp_polygon_pdf(int num_corners)
+{
+  const auto n = static_cast<float>(num_corners);
+  const SinCos half = sin_cos_turn(0.5f / n);
+  return 1.0f / (n * half.sin * half.cos);
+}
+
 /// Direction about +z with density proportional to the cosine (Malley's method).
 /// @return unit, z >= 0
 RELIEF_KERNEL Vec3f warp_cosine_hemisphere(Vec2f u)

@@ -1,12 +1,12 @@
 // Stage: one camera path from (pixel, sample).
 #pragma once
 
+#include "kernel/camera/aperture.h"
 #include "kernel/camera/camera_ray.h"
 #include "kernel/counters.h"
 #include "kernel/globals.h"
 #include "kernel/sample/dimensions.h"
 #include "kernel/sample/sobol.h"
-#include "kernel/sample/warp.h"
 #include "kernel/state/path_state.h"
 
 namespace relief {
@@ -42,18 +42,16 @@ RELIEF_KERNEL void generate_camera_path(const KernelGlobals& g,
   const float film_y = (static_cast<float>(image_y) + 0.5f + filter_offset(u.y)) / static_cast<float>(g.full_height);
   Vec2f lens{};
   if (g.camera.aperture_radius > 0.0f) {
-    lens = warp_disk(sample_2d(hash, sample_index, dimension_camera(CameraDimension::kLens)));
+    lens = aperture_sample(g.camera, sample_2d(hash, sample_index, dimension_camera(CameraDimension::kLens)));
   }
-  const float pixel_height = 1.0f / static_cast<float>(g.full_height);
   CameraRay ray;
   if (state.motion.time != nullptr) {
     const float time = path_time_sample(g, hash, sample_index);
     state.motion.time[path] = time;
-    Camera camera = g.camera;
-    if (g.camera_motion.num_keys > 0) camera.world_from_camera = motion_at(g.camera_motion, time);
-    ray = camera_ray_make(camera, film_x, film_y, lens, pixel_height);
+    const Affine3 place = g.camera_motion.num_keys > 0 ? motion_at(g.camera_motion, time) : g.camera.world_from_camera;
+    ray = camera_ray_make(g.camera, place, film_x, film_y, lens, g.pixel_size);
   } else {
-    ray = camera_ray_make(g.camera, film_x, film_y, lens, pixel_height);
+    ray = camera_ray_make(g.camera, g.camera.world_from_camera, film_x, film_y, lens, g.pixel_size);
   }
 
   state.O[path] = ray.O;

@@ -127,6 +127,74 @@ def test_depth_of_field_orthographic():
     assert_agrees(scene, block=4, samples=32)
 
 
+def _bokeh(width, height, **settings):
+    """A few small bright balls far out of focus: each is the shape of the aperture."""
+    scene = new_scene(width, height)
+    set_world((0.02, 0.02, 0.02))
+    glow = new_material("glow", "ShaderNodeEmission", Color=(1, 0.6, 0.2, 1), Strength=30.0)[0]
+    for x in (-1.8, 0, 1.8):
+        for y in (-0.9, 0.9):
+            add_sphere(0.15, glow, (x, y, -8), segments=12)
+    camera = add_camera((0, 0, 0), (0, 0, 0), lens=50, **settings)
+    camera.data.dof.use_dof = True
+    camera.data.dof.focus_distance, camera.data.dof.aperture_fstop = 2.0, 0.08
+    return scene, camera.data.dof
+
+
+def test_aperture_with_blades():
+    scene, dof = _bokeh(64, 40)
+    dof.aperture_blades = 5
+    assert_agrees(scene, block=4, samples=256)
+
+
+def test_aperture_that_is_turned():
+    scene, dof = _bokeh(64, 40)
+    dof.aperture_blades, dof.aperture_rotation = 3, 0.5
+    assert_agrees(scene, block=4, samples=256)
+
+
+def test_aperture_by_ratio():
+    scene, dof = _bokeh(64, 40)
+    dof.aperture_ratio = 2.5
+    assert_agrees(scene, block=4, samples=256)
+
+
+def test_aperture_of_all_at_once_orthographic():
+    scene, dof = _bokeh(40, 64, type="ORTHO", ortho_scale=5)
+    dof.aperture_fstop, dof.aperture_blades, dof.aperture_rotation, dof.aperture_ratio = 1.6, 4, -0.4, 0.6
+    assert_agrees(scene, block=4, samples=256)
+
+
+def _with_pixels(scene, x, y):
+    scene.render.pixel_aspect_x, scene.render.pixel_aspect_y = x, y
+    return scene
+
+
+def test_wide_pixels():
+    assert_agrees(_with_pixels(_stage(64, 40, lens=35, shift_x=0.1, shift_y=0.05)[0], 1.5, 1), block=4)
+
+
+def test_high_pixels_that_make_a_portrait():
+    """The sensor's side that counts is chosen by the picture's true shape: 64 × 40 pixels are higher than wide here."""
+    assert_agrees(_with_pixels(_stage(64, 40, lens=35, shift_x=0.1, shift_y=0.05)[0], 1, 2), block=4)
+
+
+def test_wide_pixels_fitted_by_height():
+    scene = _stage(64, 40, lens=30, sensor_fit="VERTICAL", sensor_height=20, shift_x=0.1)[0]
+    assert_agrees(_with_pixels(scene, 1.4, 1), block=4)
+
+
+def test_wide_pixels_orthographic():
+    scene = _stage(40, 64, type="ORTHO", ortho_scale=5, shift_x=0.1, shift_y=0.05)[0]
+    assert_agrees(_with_pixels(scene, 2, 1), block=4)
+
+
+def test_wide_pixels_out_of_focus():
+    scene, camera = _stage(64, 40, lens=50)
+    _focus(camera, 0.08)
+    assert_agrees(_with_pixels(scene, 1.5, 1), block=4, samples=32)
+
+
 def _eyes(scene, engine):
     """Pictures of both eyes: {"L" or "R": (height, width, 3)}."""
     scene.render.image_settings.views_format = "INDIVIDUAL"

@@ -23,7 +23,6 @@ _MISSING = {
     "render: operator *hair*": "of other engines",
     "data: *.fisheye_*": "no panoramic cameras; a warning tells",
     "data: *.panorama_type": "no panoramic cameras; a warning tells",
-    "data: CameraDOFSettings.aperture_*": "apertures are round; a warning tells",
     "object: Object.is_shadow_catcher": "no shadow catchers; a warning tells",
     "view_layer: *.use_pass_shadow_catcher": "no shadow catchers",
     "*: *light*group*": "no light groups; a warning tells",

@@ -81,6 +81,19 @@ TEST(PictureShare, IsThePartThatASquareCovers)
   EXPECT_NEAR(share(square, orthographic), 4.0 / 64, 1e-6);
 }
 
+/// Lengths are counted by the shorter side of a pixel, so that nothing is too coarse.
+TEST(PictureView, TakesTheShorterSideOfAPixel)
+{
+  Camera camera = camera_at(8);
+  const auto pixels = [&camera](float aspect) {
+    camera.pixel_aspect = aspect;
+    return PictureView(camera, 100).pixels({0, 0, 0}, {1, 0, 0});
+  };
+  const double square = pixels(1);
+  EXPECT_NEAR(pixels(3), square, 1e-6 * square);
+  EXPECT_NEAR(pixels(0.5f), 2 * square, 1e-6 * square);
+}
+
 /// A ground on which the camera stands covers what is below the horizon, however large its triangles are.
 TEST(PictureShare, IsBelowTheHorizonForAGround)
 {

@@ -274,7 +274,9 @@ TEST_F(ExrTest, NumbersAndMatricesAreSuchToEveryReader)
     Imf::worldToNDC(header).multVecMatrix(P, on_screen);
     // Half of half the width, less the shift of a tenth of the whole; half of half the height.
     EXPECT_NEAR((on_screen - Imath::V3f(0.5f - 0.2f, 0.5f, 0.5f)).length(), 0, 1e-6);
+    EXPECT_EQ(header.pixelAspectRatio(), 1);
     camera.projection = Projection::kOrthographic;
+    camera.pixel_aspect = 1.5f;
   }
   for (const auto& [name, text] : exr_camera_attributes(camera)) attributes[name] = text;
   exr_write(file("b.exr"), TestFilm(3, 2, 6).view, attributes);
@@ -282,7 +284,10 @@ TEST_F(ExrTest, NumbersAndMatricesAreSuchToEveryReader)
   Imath::V3f on_screen;
   Imf::worldToNDC(input.header()).multVecMatrix(Imath::V3f(3, 2.25f, 2.5f), on_screen);
   EXPECT_NEAR((on_screen - Imath::V3f(1 - 0.2f, 1, 2)).length(), 0, 1e-6);
+  EXPECT_EQ(input.header().pixelAspectRatio(), 1.5f);
+  EXPECT_FALSE(exr_load(file("a.exr")).attributes.contains("pixelAspectRatio"));
   const Picture picture = exr_load(file("b.exr"));
+  EXPECT_EQ(picture.attributes.at("pixelAspectRatio"), "1.5");
   EXPECT_EQ(picture.attributes.at("relief:seed"), "4000000001");
   exr_write(file("c.exr"), picture);
   EXPECT_EQ(exr_load(file("c.exr")).attributes, picture.attributes);

@@ -217,7 +217,9 @@ def lights():
     b.json["images"] = [{"uri": PIXEL}]
     b.json["cameras"] = [
         {"type": "perspective", "perspective": {"yfov": .7, "znear": .1, "aspectRatio": 1.5},
-         "extensions": {"RELIEF_camera": {"apertureRadius": .01, "focusDistance": 2, "shift": [.1, 0], "clip": [.1, 9]}}},
+         "extensions": {"RELIEF_camera": {
+             "apertureRadius": .01, "apertureBlades": 6, "apertureRotation": 1, "apertureRatio": 2, "pixelAspect": 1.5,
+             "focusDistance": 2, "shift": [.1, 0], "clip": [.1, 9]}}},
         {"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 2, "znear": 0, "zfar": 9}}]
     for i in range(3):
         b.node(name=f"light {i}", rotation=[0, .7071, 0, .7071], extensions={"KHR_lights_punctual": {"light": i}})

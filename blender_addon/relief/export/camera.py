@@ -2,6 +2,16 @@
 """Blender's cameras as glTF cameras with RELIEF_camera."""
 
 import math
+from dataclasses import dataclass
+
+@dataclass(frozen=True)
+class Frame:
+    """A whole picture: its size in pixels, and a pixel's width over its height."""
+
+    width: int
+    height: int
+    pixel_aspect: float
+
 
 #: Blender's focal lengths and sensors are in millimetres.
 _METRES_PER_MILLIMETRE = 1e-3
@@ -12,11 +22,11 @@ def camera_json(camera, own_shift, frame, focus_distance, warn):
 
     @param  camera          bpy camera
     @param  own_shift       its shift along both axes, that of its eye
-    @param  frame           (width, height) of the whole picture in pixels
+    @param  frame           Frame
     @param  focus_distance  metres along the camera's axis
     @param  warn            called with what is not understood, and what was used instead
     """
-    aspect = frame[0] / frame[1]
+    aspect = frame.width * frame.pixel_aspect / frame.height
     is_horizontal = camera.sensor_fit == "HORIZONTAL" or (camera.sensor_fit == "AUTO" and aspect >= 1)
     # Blender's lengths (sensor, orthographic scale, shift) are fractions of one side of the picture, the fitted one.
     by_width, by_height = (1.0, aspect) if is_horizontal else (1 / aspect, 1.0)
@@ -32,7 +42,9 @@ def camera_json(camera, own_shift, frame, focus_distance, warn):
     clip = (camera.clip_start, camera.clip_end)
     out = lens_json(camera.type == "ORTHO", half_height, aspect, shift, clip)
     out["name"] = camera.name
-    out["extensions"]["RELIEF_camera"].update(aperture(camera, focus_distance, warn))
+    if frame.pixel_aspect != 1:
+        out["extensions"]["RELIEF_camera"]["pixelAspect"] = frame.pixel_aspect
+    out["extensions"]["RELIEF_camera"].update(aperture(camera, focus_distance))
     return out
 
 
@@ -51,13 +63,17 @@ def lens_json(is_orthographic, half_height, aspect, shift, clip):
     return {"type": "perspective", "perspective": lens, "extensions": {"RELIEF_camera": extension}}
 
 
-def aperture(camera, focus_distance, warn):
+def aperture(camera, focus_distance):
     """The part of RELIEF_camera that is depth of field; {} without."""
-    if not camera.dof.use_dof:
+    dof = camera.dof
+    if not dof.use_dof:
         return {}
-    if camera.dof.aperture_blades > 2 or camera.dof.aperture_ratio != 1:
-        warn("an aperture with blades or a ratio", "a round one was used")
     # An orthographic camera has no focal length; Blender then takes the lens to be a metre long.
     focal_length = camera.lens * _METRES_PER_MILLIMETRE if camera.type != "ORTHO" else 1.0
-    radius = focal_length / (2 * max(camera.dof.aperture_fstop, 1e-5))
-    return {"apertureRadius": radius, "focusDistance": max(focus_distance, 1e-5)}
+    radius = focal_length / (2 * max(dof.aperture_fstop, 1e-5))
+    out = {"apertureRadius": radius, "focusDistance": max(focus_distance, 1e-5)}
+    if dof.aperture_blades > 2:
+        out["apertureBlades"], out["apertureRotation"] = dof.aperture_blades, dof.aperture_rotation
+    if dof.aperture_ratio != 1:
+        out["apertureRatio"] = dof.aperture_ratio
+    return out

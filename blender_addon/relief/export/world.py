@@ -43,7 +43,7 @@ class Eye:
         columns = np.array(matrix, dtype=np.float64)[:3, :3]
         right, up, back = (columns / np.linalg.norm(columns, axis=0)).T
         half_height = math.tan(camera["perspective"]["yfov"] / 2)
-        half_window = (half_height * size[0] / size[1], half_height)
+        half_window = (half_height * size[0] * extension.get("pixelAspect", 1) / size[1], half_height)
         return cls(np.stack([right, up, -back]), half_window, tuple(extension["shift"]))
 
 

@@ -129,6 +129,28 @@ TEST(WarpDisk, KeepsAreas)
   }
 }
 
+TEST(WarpPolygon, InverseUndoesItAndAreasAreKept)
+{
+  TestRandom random(6);
+  for (const int corners : {3, 4, 5, 7, 16}) {
+    const double n = corners;
+    EXPECT_NEAR(warp_polygon_pdf(corners) * n / 2 * std::sin(2 * std::acos(-1.0) / n), 1, 1e-6);
+    for (int k = 0; k < 1000; ++k) {
+      const Vec2f u{0.99f * random.next(), 0.01f + 0.98f * random.next()};
+      const Vec2f p = warp_polygon(u, corners), back = warp_polygon_inverse(p, corners);
+      ASSERT_NEAR(back.x, u.x, 2e-5) << corners;
+      ASSERT_NEAR(back.y, u.y, 1e-5) << corners;
+      // The area of a small square's image over the square's, but across a corner, where it is bent.
+      constexpr float h = 2e-3f;
+      if (std::floor(u.x * static_cast<float>(corners)) != std::floor((u.x + h) * static_cast<float>(corners)))
+        continue;
+      const Vec2f b = warp_polygon({u.x + h, u.y}, corners), c = warp_polygon({u.x, u.y + h}, corners);
+      const float area = std::abs((b.x - p.x) * (c.y - p.y) - (b.y - p.y) * (c.x - p.x)) / (h * h);
+      ASSERT_NEAR(area * warp_polygon_pdf(corners), 1.0f, 0.07f) << corners << ": " << u.x << " " << u.y;
+    }
+  }
+}
+
 TEST(WarpTriangle, IsUniformAndInvertible)
 {
   TestRandom random(5);
