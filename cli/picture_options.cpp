@@ -32,7 +32,7 @@ Camera camera_for_image(const SceneCamera& chosen, const PictureOptions& options
   Camera camera = chosen.camera;
   if (options.fov > 0) {
     if (camera.projection != Projection::kPerspective) {
-      throw CLI::ValidationError("--fov", "expected a perspective camera, found an orthographic one");
+      throw CLI::ValidationError("--fov", "expected a perspective camera, found another");
     }
     camera.half_height = static_cast<float>(std::tan(options.fov * std::numbers::pi / 360));
   }

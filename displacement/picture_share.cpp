@@ -43,6 +43,19 @@ double area_in_picture(const Polygon& polygon)
   return twice / 2;
 }
 
+/// Area of a triangle in a panorama's picture, about: its solid angle, as if it were in the middle; 0 if its own middle is not shown.
+/// With the sign of its direction of turning.
+/// @param a, b, c  the camera's space
+/// @source van Oosterom and Strackee 1983, "The Solid Angle of a Plane Triangle"
+double area_in_panorama(const Vec3d& a, const Vec3d& b, const Vec3d& c, const PictureView& view)
+{
+  const Vec3d middle = a + b + c;
+  if (!view.shows({static_cast<float>(middle.x), static_cast<float>(middle.y), static_cast<float>(middle.z)})) return 0;
+  const double la = length(a), lb = length(b), lc = length(c);
+  const double over = la * lb * lc + dot(a, b) * lc + dot(a, c) * lb + dot(b, c) * la;
+  return 2 * std::atan2(dot(a, cross(b, c)), over) / view.middle_solid_angle();
+}
+
 }  // namespace
 
 double picture_share(const MeshView& mesh, std::span<const Affine3> places, const PictureView& view)
@@ -68,12 +81,16 @@ double picture_share(const MeshView& mesh, std::span<const Affine3> places, cons
     const TriangleIndices& v = mesh.triangles[index % mesh.num_triangles];
     const Affine3 camera_from_object = camera_from_world * places[index / mesh.num_triangles];
     Polygon polygon;
-    for (const std::uint32_t vertex : {v.v0, v.v1, v.v2}) {
-      const Vec3d P = to_double(transform_point(camera_from_object, mesh.P[vertex]));
-      polygon.P[polygon.count++] = {P.x, P.y, is_perspective ? -P.z : 1.0};
+    for (const std::uint32_t vertex : {v.v0, v.v1, v.v2})
+      polygon.P[polygon.count++] = to_double(transform_point(camera_from_object, mesh.P[vertex]));
+    double area;
+    if (camera.projection == Projection::kPanoramic) {
+      area = area_in_panorama(polygon.P[0], polygon.P[1], polygon.P[2], view);
+    } else {
+      for (Vec3d& P : polygon.P) P.z = is_perspective ? -P.z : 1.0;
+      for (const Vec3d& side : sides) polygon = clip(polygon, side);
+      area = area_in_picture(polygon);
     }
-    for (const Vec3d& side : sides) polygon = clip(polygon, side);
-    const double area = area_in_picture(polygon);
     seen[area < 0] += std::fabs(area);
   }
   return std::min(step * std::max(seen[0], seen[1]) / (4 * half_width * half_height), 1.0);

@@ -35,6 +35,24 @@ class PictureView {
   Camera camera;
   double height;  ///< pixels
 
+  /// Of a panoramic camera, in the middle: solid angle for a unit of area of the picture.
+  double middle_solid_angle() const
+  {
+    // A pole has none, and a lens may show nothing there.
+    constexpr double kLeast = 1e-6;
+    return std::max(static_cast<double>(panorama_point(camera.panorama, 0, 0).solid_angle), kLeast);
+  }
+  /// Whether a panorama's picture shows what is some way.
+  /// @param D  the camera's space
+  bool shows(Vec3f D) const
+  {
+    const Vec2f at = panorama_project(camera.panorama, D);
+    const auto is_in = [](float x, float half, float shift) {
+      return !(__builtin_fabsf(x / half - 2.0f * shift) > 1.0f);
+    };
+    return is_in(at.x, camera.half_width, camera.shift_x) && is_in(at.y, camera.half_height, camera.shift_y);
+  }
+
   /// Length of a line in the picture, pixels: as if all of it were as near as its nearest point.
   /// @param a, b  world
   double pixels(Vec3f a, Vec3f b) const
@@ -52,7 +70,7 @@ class PictureView {
     const Vec3d from_eye = middle - eye_;
     const double depth = -dot(from_eye, back_);
     double most;
-    if (camera.projection == Projection::kPerspective) {
+    if (camera.projection != Projection::kOrthographic) {
       most = pixels_a_radian() / std::max(length(from_eye) - radius, 1e-30);
     } else {
       most = pixels_in_plane(std::max(length(from_eye + depth * back_) - radius, 0.0));
@@ -74,6 +92,8 @@ class PictureView {
   double coarsening(Vec3d P) const
   {
     const Vec3d from_eye = P - eye_;
+    if (camera.projection == Projection::kPanoramic)
+      return std::clamp(out_of_panorama(P) / kAround, 1.0, most_coarsening_);
     const double depth = -dot(from_eye, back_);
     const double size = camera.projection == Projection::kPerspective ? depth : 1.0;
     if (!(size > 0.0)) return most_coarsening_ * coarsening_afar(P);
@@ -111,15 +131,17 @@ class PictureView {
   double pixels_a_metre(const Vec3d& P, const Vec3d& along) const
   {
     const Vec3d to_eye = eye_ - P;
-    if (camera.projection == Projection::kPerspective)
+    if (camera.projection != Projection::kOrthographic)
       return pixels_a_radian() / std::max(distance_to_line(to_eye, along), 1e-30);
     return pixels_in_plane(distance_to_line(to_eye - dot(to_eye, back_) * back_, along - dot(along, back_) * back_));
   }
-  /// Of a perspective camera, in the middle of its picture; of an orthographic one pixels a metre.
-  /// By the shorter side of pixels that are not square.
+  /// Of a perspective or panoramic camera, in the middle of its picture; of an orthographic one pixels a metre.
+  /// By the shorter side of pixels that are not square; of a panorama's, by their solid angle.
   double pixels_a_radian() const
   {
-    const double side = std::min(static_cast<double>(camera.pixel_aspect), 1.0);
+    const double aspect = static_cast<double>(camera.pixel_aspect);
+    const double side =
+        camera.projection == Projection::kPanoramic ? std::sqrt(aspect * middle_solid_angle()) : std::min(aspect, 1.0);
     return height / (2.0 * static_cast<double>(camera.half_height) * side);
   }
   /// Of an orthographic camera, at a distance from its axis: as in the picture for as far around as it is wide, and then less.
@@ -129,6 +151,17 @@ class PictureView {
         (1.0 + std::abs(static_cast<double>(camera.shift_x)) + std::abs(static_cast<double>(camera.shift_y))) * 2.0 *
         std::hypot(static_cast<double>(camera.half_width), static_cast<double>(camera.half_height));
     return pixels_a_radian() * std::min(within / distance, 1.0);
+  }
+
+  /// How far out of a panorama's picture a point is: 1 at its border.
+  double out_of_panorama(const Vec3d& P) const
+  {
+    const Vec3d d = P - eye_;
+    const Vec3f seen{static_cast<float>(dot(d, right_)), static_cast<float>(dot(d, up_)),
+                     static_cast<float>(dot(d, back_))};
+    const Vec2f at = panorama_project(camera.panorama, seen);
+    return static_cast<double>(max(__builtin_fabsf(at.x / camera.half_width - 2.0f * camera.shift_x),
+                                   __builtin_fabsf(at.y / camera.half_height - 2.0f * camera.shift_y)));
   }
 
   double most_coarsening_;

@@ -250,7 +250,10 @@ Attributes exr_camera_attributes(const Camera& camera)
     // There need not be planes that the third coordinate could lie between: it rises with the distance, and tells it.
     screen_matrix[i] = {x * x_scale - w * x_shift, y * y_scale - w * y_shift, is_perspective ? w - one : -z, w};
   }
-  Attributes attributes = {{"worldToCamera", text(camera_matrix)}, {"worldToNDC", text(screen_matrix)}};
+  Attributes attributes = {{"worldToCamera", text(camera_matrix)}};
+  // No matrix makes a panorama.
+  if (camera.projection == Projection::kPanoramic) return attributes;
+  attributes["worldToNDC"] = text(screen_matrix);
   if (camera.pixel_aspect != 1)
     attributes["pixelAspectRatio"] = attribute_number(static_cast<double>(camera.pixel_aspect));
   return attributes;

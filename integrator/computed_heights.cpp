@@ -411,7 +411,8 @@ void computed_heights_add(const Scene& scene, const DisplacementOptions& options
   graph_scene.columns = all->views.instance_columns.data();
   graph_scene.num_columns = static_cast<std::uint32_t>(all->views.instance_columns.size());
   graph_scene.camera = camera;
-  graph_scene.camera_from_world = inverse(camera.world_from_camera);
+  graph_scene.camera.world_from_camera = camera_graph_frame(camera);
+  graph_scene.camera_from_world = inverse(graph_scene.camera.world_from_camera);
   std::map<std::tuple<int, int, int>, int> known;  // mesh, displacement, instance where that matters
   struct Place {
     const MeshView* mesh;

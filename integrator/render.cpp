@@ -47,7 +47,8 @@ KernelGlobals render_globals(const SceneContext& context, const RenderOptions& o
   g.camera_forward = normalize(-options.camera.world_from_camera.z);
   g.camera_motion = context.motion.view(options.camera_motion_index);
   g.graph_scene.camera = options.camera;
-  g.graph_scene.camera_from_world = inverse(options.camera.world_from_camera);
+  g.graph_scene.camera.world_from_camera = camera_graph_frame(options.camera);
+  g.graph_scene.camera_from_world = inverse(g.graph_scene.camera.world_from_camera);
   // A path counts in bytes; between mirrors that take nothing only this ends it.
   constexpr int kMostBounces = 200;
   g.limits = {std::min(settings.max_bounces, kMostBounces),

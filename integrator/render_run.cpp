@@ -206,11 +206,12 @@ Film film_make(const Scene& scene, const RenderOptions& options)
 {
   const RenderSettings& settings = options.settings;
   const FilmWindow window = render_window(options);
+  const bool is_panoramic = options.camera.projection == Projection::kPanoramic;
   return {window.width,
           window.height,
           options.aov_mask,
           settings.cryptomatte_levels,
-          !scene.environment.visible_to_camera || has_holdouts(scene) || has_media(scene),
+          !scene.environment.visible_to_camera || has_holdouts(scene) || has_media(scene) || is_panoramic,
           settings.noise_threshold > 0};
 }
 

@@ -153,13 +153,14 @@ bool Wavefront::run(const KernelGlobals& g,
   const std::uint32_t num_paths = stages.generate(g, state_, batch);
   active_.size = num_paths;
   for (std::uint32_t i = 0; i < active_.size; ++i) active_.paths[i] = i;
+  if (g.camera.projection == Projection::kPanoramic) drop_unseen(g);
   if (media != nullptr) media->start(state_, active_);
   if (g.caustics.enabled) {
     for (std::uint32_t i = 0; i < num_paths; ++i) (*state_.caustic.radiance)[i] = Vec3f{};
     std::iota(state_.caustic.root, state_.caustic.root + num_paths, 0u);
     state_.caustic.num_paths = num_paths;
   }
-  counters.camera_rays += active_.size;
+  counters.camera_rays += num_paths;
   charge(Stage::kGenerate);
 
   DisplacementWork displacement;
@@ -230,6 +231,22 @@ bool Wavefront::run(const KernelGlobals& g,
   stages.finish(g, state_, batch, num_paths, counters, first_nonfinite);
   charge(Stage::kFilm);
   return true;
+}
+
+/// Ends paths that start where a lens shows nothing: black, and no surroundings either.
+void Wavefront::drop_unseen(const KernelGlobals& g)
+{
+  std::uint32_t num_seen = 0;
+  for (std::uint32_t i = 0; i < active_.size; ++i) {
+    const std::uint32_t path = active_.paths[i];
+    if (state_.t_max[path] < 0.0f) {
+      film_add_clear(g.film, state_.pixel[path], -1.0f);
+      if (state_.media != nullptr) state_.media[path] = {};
+    } else {
+      active_.paths[num_seen++] = path;
+    }
+  }
+  active_.size = num_seen;
 }
 
 void Wavefront::trace_photons(const KernelGlobals& g,

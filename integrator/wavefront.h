@@ -94,6 +94,7 @@ class Wavefront {
 
  private:
   void clear_queues();
+  void drop_unseen(const KernelGlobals& g);
   void trace_shadows(const KernelGlobals& g, const Accel& accel, ShadowStart start, DisplacementWork& displacement);
   void note_displacement(const DisplacementWork& work);
   void record_rays() const;

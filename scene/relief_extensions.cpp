@@ -224,6 +224,78 @@ RenderSettings relief_render(const GltfDocument& document, Warnings& warnings)
   return s;
 }
 
+namespace {
+
+constexpr std::string_view kPanoramaLabels[] = {"equirectangular", "cylindrical", "equidistant", "equisolid",
+                                                "polynomial",      "mirror-ball", "cube-face"};
+
+/// Two different numbers.
+void read_range(const JsonReader& r, const char* name, double most, float& first, float& last)
+{
+  const std::vector<double> ends = r.numbers(name, 2, 2, -most, most);
+  if (ends.empty()) return;
+  first = static_cast<float>(ends[0]);
+  last = static_cast<float>(ends[1]);
+  if (first == last) r.fail(name, "two different numbers");
+}
+
+/// What fisheyes say of their lens and sensor.
+void read_fisheye(const JsonReader& r, Panorama& p)
+{
+  constexpr double kMostField = 100, kLeastLength = 1e-3, kMostLength = 1e6;  // radians, millimetres
+  p.half_field = 0.5f * r.number_f("fieldOfView", 2.0f * p.half_field, 1e-3, kMostField);
+  if (p.kind == PanoramaKind::kEquidistant) return;
+  const std::vector<double> sensor = r.numbers("sensor", 2, 2, kLeastLength, kMostLength);
+  if (!sensor.empty()) {
+    p.half_sensor_width = static_cast<float>(0.5 * sensor[0]);
+    p.half_sensor_height = static_cast<float>(0.5 * sensor[1]);
+  }
+  if (p.kind == PanoramaKind::kEquisolid) {
+    p.focal_length = r.number_f("focalLength", p.focal_length, kLeastLength, kMostLength);
+    return;
+  }
+  constexpr std::size_t kCount = std::size(Panorama{}.k);
+  const std::vector<double> k = r.numbers("coefficients", kCount, kCount, -1e6, 1e6);
+  if (k.empty()) r.fail("coefficients", "five numbers");
+  for (std::size_t i = 0; i < kCount; ++i) p.k[i] = static_cast<float>(k[i]);
+}
+
+/// Makes a camera a panoramic one.
+void read_panorama(const JsonReader& r, Camera& camera, Warnings& warnings)
+{
+  Panorama& p = camera.panorama;
+  camera.projection = Projection::kPanoramic;
+  p.kind = static_cast<PanoramaKind>(r.choice("type", kPanoramaLabels, static_cast<int>(p.kind)));
+  constexpr double kMostAngle = 100, kMostHeight = 1e6;
+  switch (p.kind) {
+    case PanoramaKind::kEquirectangular:
+      read_range(r, "longitude", kMostAngle, p.longitude_min, p.longitude_max);
+      read_range(r, "latitude", kMostAngle, p.latitude_min, p.latitude_max);
+      break;
+    case PanoramaKind::kCylindrical:
+      read_range(r, "longitude", kMostAngle, p.longitude_min, p.longitude_max);
+      read_range(r, "heights", kMostHeight, p.height_min, p.height_max);
+      break;
+    case PanoramaKind::kEquidistant:
+    case PanoramaKind::kEquisolid:
+    case PanoramaKind::kPolynomial:
+      read_fisheye(r, p);
+      break;
+    case PanoramaKind::kMirrorBall:
+    case PanoramaKind::kCubeFace:
+      break;
+  }
+  camera.half_width = camera.half_height = 1;
+  const std::vector<double> window = r.numbers("window", 2, 2, 1e-6, 1e6);
+  if (!window.empty()) {
+    camera.half_width = static_cast<float>(window[0]);
+    camera.half_height = static_cast<float>(window[1]);
+  }
+  r.warn_unread(warnings);
+}
+
+}  // namespace
+
 void relief_camera(const GltfDocument& document, int camera_index, Camera& camera, Shutter& shutter, Warnings& warnings)
 {
   constexpr int kMostBlades = 1000;
@@ -231,8 +303,14 @@ void relief_camera(const GltfDocument& document, int camera_index, Camera& camer
   const auto index = static_cast<std::size_t>(camera_index);
   const std::string path = "/cameras/" + std::to_string(index);
   document.read_extension(document.element("cameras", index), path, "RELIEF_camera", [&](const JsonReader& r) {
-    camera.pixel_aspect = r.number_f("pixelAspect", 1, 1e-3, 1e3);
-    camera.half_width *= camera.pixel_aspect;
+    if (r.has("panorama")) {
+      if (camera.projection != Projection::kPerspective)
+        r.fail("panorama", "a perspective camera that it is of", "another");
+      read_panorama(r.object("panorama"), camera, warnings);
+    } else {
+      camera.pixel_aspect = r.number_f("pixelAspect", 1, 1e-3, 1e3);
+      camera.half_width *= camera.pixel_aspect;
+    }
     camera.aperture_radius = r.number_f("apertureRadius", 0, 0, kFarthest);
     camera.aperture_blades = static_cast<int>(r.integer("apertureBlades", 0, 0, kMostBlades));
     camera.aperture_rotation = r.number_f("apertureRotation", 0, -kMostTurns, kMostTurns);

@@ -115,8 +115,8 @@ def build_camera(gltf, node, matrix):
     data.lens = 12.0 / math.tan(camera["perspective"]["yfov"] / 2)
     if lens.get("shift", [0, 0]) != [0, 0] or "clip" in lens:
         raise Unsupported("camera shift or clipping")
-    if "pixelAspect" in lens:
-        raise Unsupported("pixels that are not square")
+    if "pixelAspect" in lens or "panorama" in lens:
+        raise Unsupported("pixels that are not square, or a panorama")
     data.clip_start, data.clip_end = 1e-4, 1e6
     radius = lens.get("apertureRadius", 0)
     if radius > 0:

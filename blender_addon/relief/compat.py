@@ -315,6 +315,11 @@ def sun_divisor(half_angle):
     return math.pi * math.sin(half_angle) ** 2 if IS_4_0 else 2 * math.pi * (1 - math.cos(half_angle))
 
 
+def panorama_of(camera):
+    """Owner of a camera's panoramic properties: Cycles' settings before 5.0; None without Cycles there."""
+    return camera if hasattr(camera, "panorama_type") else getattr(camera, "cycles", None)
+
+
 def casts_shadow(light):
     """Whether a light's shadows are on. It was Cycles' property before 4.2."""
     owner = light if hasattr(light, "use_shadow") and bpy.app.version >= (4, 2, 0) else getattr(light, "cycles", None)

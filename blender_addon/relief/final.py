@@ -247,6 +247,13 @@ def any_view(size):
     return View({"type": "perspective", "perspective": {"yfov": 1.0, "znear": 0.1}}, np.eye(4).tolist(), size)
 
 
+def frame_of(scene):
+    """Frame of a scene's pictures."""
+    render = scene.render
+    width, height = (int(side * render.resolution_percentage / 100) for side in (render.resolution_x, render.resolution_y))
+    return Frame(width, height, render.pixel_aspect_x / render.pixel_aspect_y)
+
+
 def view_of(engine, depsgraph, warnings):
     """(View of the scene's camera, render region as (x0, y0, x1, y1) from the top left or None)."""
     scene = depsgraph.scene
@@ -258,12 +265,14 @@ def view_of(engine, depsgraph, warnings):
         raise ReliefError(f'the scene looks through "{camera.name}", which is not a camera')
     matrix = engine.camera_model_matrix(camera)
     render = scene.render
-    width = int(render.resolution_x * render.resolution_percentage / 100)
-    height = int(render.resolution_y * render.resolution_percentage / 100)
+    frame = frame_of(scene)
+    width, height = frame.width, frame.height
     distance = focus_distance(camera, camera.matrix_world, depsgraph)
     shift = (engine.camera_shift_x(camera), camera.data.shift_y)
-    frame = Frame(width, height, render.pixel_aspect_x / render.pixel_aspect_y)
-    lens = camera_json(camera.data, shift, frame, distance, lambda *t: warnings.warn(f'camera "{camera.name}"', *t))
+    where = f'camera "{camera.name}"'
+    lens = camera_json(camera.data, shift, frame, distance, lambda *t: warnings.warn(where, *t))
+    if engine.use_spherical_stereo(camera):
+        warnings.warn(where, "spherical stereoscopy", "eyes look from where those of a flat picture do")
     view = View(lens, [list(row) for row in matrix], (width, height))
     if not render.use_border:
         return view, None

@@ -43,6 +43,19 @@ _BORROWED_PANELS = {"EEVEE_MATERIAL_PT_context_material", "MATERIAL_PT_preview"}
 _NODE_MENUS = ("nodeitems_builtins", "bl_ui.node_add_menu_shader")
 
 
+#: What each kind of panoramic camera has.
+_PANORAMA_ROWS = {
+    "EQUIRECTANGULAR": ("latitude_min", "latitude_max", "longitude_min", "longitude_max"),
+    "CENTRAL_CYLINDRICAL": (
+        *(f"central_cylindrical_range_{end}" for end in ("v_min", "v_max", "u_min", "u_max")),
+        "central_cylindrical_radius",
+    ),
+    "FISHEYE_EQUIDISTANT": ("fisheye_fov",),
+    "FISHEYE_EQUISOLID": ("fisheye_lens", "fisheye_fov"),
+    "FISHEYE_LENS_POLYNOMIAL": ("fisheye_fov", *(f"fisheye_polynomial_k{i}" for i in range(5))),
+}
+
+
 class _Panel:
     """Base of panels: properties editor, shown for this engine alone."""
 
@@ -609,6 +622,22 @@ class RELIEF_PT_object_caustics(_SeenObjectPanel, bpy.types.Panel):
         rows.prop(settings, "caustic_light")
 
 
+class RELIEF_PT_camera_panorama(_CameraPanel, bpy.types.Panel):
+    bl_label = "Panorama"
+    bl_context = "data"
+
+    @classmethod
+    def poll(cls, context):
+        is_panoramic = super().poll(context) and context.camera.type == "PANO"
+        return is_panoramic and compat.panorama_of(context.camera) is not None
+
+    def draw(self, context):
+        lens, rows = compat.panorama_of(context.camera), self.rows()
+        rows.prop(lens, "panorama_type")
+        for name in _PANORAMA_ROWS.get(lens.panorama_type, ()):
+            rows.prop(lens, name)
+
+
 class RELIEF_PT_camera_dof(_CameraPanel, bpy.types.Panel):
     bl_label = "Depth of Field"
     bl_context = "data"
@@ -663,6 +692,7 @@ _classes = (
     RELIEF_PT_object_motion_blur,
     RELIEF_PT_object_ray_visibility,
     RELIEF_PT_object_caustics,
+    RELIEF_PT_camera_panorama,
     RELIEF_PT_camera_dof,
     *map(_in_node_editor, (RELIEF_PT_light, RELIEF_PT_material_settings, RELIEF_PT_world_ray_visibility)),
 )

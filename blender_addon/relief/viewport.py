@@ -17,7 +17,7 @@ import numpy as np
 from gpu_extras.presets import draw_texture_2d
 
 from . import exr, final, report, result, session
-from .export.camera import aperture, lens_json
+from .export.camera import aperture, lens_json, panorama, window_of
 from .export.gltf import GltfWriter
 from .export.scene import DATA_FOLDER, SceneExporter, StoredMeshes, View, scene_json, write_view
 from .export.settings import sampling_of
@@ -259,6 +259,23 @@ class Viewport:
         self._picture = None
 
 
+def panorama_in_view(lens, frame, projection, shift):
+    """What of RELIEF_camera makes a panorama that fills a camera's frame, which is a part of a view or more; {}: it is none.
+
+    @param  lens        bpy camera
+    @param  frame       Window of the camera
+    @param  projection  matrix of the view
+    @param  shift       of the view, in fractions of its width and height
+    """
+    shown = panorama(lens, frame, lambda *_: None)
+    if shown is None:
+        return {}
+    sizes = (frame.half_height * frame.aspect * projection[0, 0], frame.half_height * projection[1, 1])  # of the frame in the view
+    shown["window"] = [1 / size for size in sizes]
+    moved = zip(shift, frame.shift, (lens.shift_x, lens.shift_y), sizes)
+    return {"panorama": shown, "shift": [of_view + (own - of_frame) * size for of_view, of_frame, own, size in moved]}
+
+
 def _view(context, depsgraph):
     """What a 3D view shows, by its projection matrix: holds for free views and zoomed or moved camera views."""
     region, space, view3d = context.region, context.space_data, context.region_data
@@ -279,4 +296,7 @@ def _view(context, depsgraph):
     if has_camera:
         distance = final.focus_distance(looks_through.evaluated_get(depsgraph), looks_through.matrix_world, depsgraph)
         camera["extensions"]["RELIEF_camera"].update(aperture(lens, distance))
+        if lens.type == "PANO":
+            frame = window_of(lens, (lens.shift_x, lens.shift_y), final.frame_of(depsgraph.scene))
+            camera["extensions"]["RELIEF_camera"].update(panorama_in_view(lens, frame, projection, shift))
     return View(camera, matrix.tolist(), size)

@@ -127,10 +127,15 @@ RELIEF_KERNEL float graph_to_world(const Affine3& m, int element)
 /// @param axis  0: from the left; 1: from the bottom; 0 to 1
 RELIEF_KERNEL float graph_window(const GraphScene& scene, Vec3f P, int axis)
 {
-  const Vec3f p = transform_point(scene.camera_from_world, P);
-  float seen = axis == 0 ? p.x / scene.camera.half_width : p.y / scene.camera.half_height;
-  if (scene.camera.projection == Projection::kPerspective) seen /= -p.z;
-  return 0.5f + 0.5f * seen - (axis == 0 ? scene.camera.shift_x : scene.camera.shift_y);
+  const Camera& camera = scene.camera;
+  Vec3f p = transform_point(scene.camera_from_world, P);
+  if (__builtin_expect(camera.projection == Projection::kPanoramic, 0)) {
+    const Vec2f at = panorama_project(camera.panorama, camera_from_graph_frame(camera, p));
+    p = {at.x, at.y, p.z};
+  }
+  float seen = axis == 0 ? p.x / camera.half_width : p.y / camera.half_height;
+  if (camera.projection == Projection::kPerspective) seen /= -p.z;
+  return 0.5f + 0.5f * seen - (axis == 0 ? camera.shift_x : camera.shift_y);
 }
 
 /// Element of one of the matrices between spaces, all with Z up and the camera looking along −Z.

@@ -383,7 +383,9 @@ RELIEF_KERNEL float path_ray_length(const KernelGlobals& g, const PathState& sta
 {
   const bool is_camera = static_cast<PathEvent>(path_event(state.flags[path])) == PathEvent::kCamera;
   if (!is_camera || !(g.camera.clip_start > 0.0f)) return state.hit_t[path];
-  return state.hit_t[path] - g.camera.clip_start / dot(path_direction(state, path), g.camera_forward);
+  const bool is_panoramic = g.camera.projection == Projection::kPanoramic;
+  const float axial = is_panoramic ? 1.0f : dot(path_direction(state, path), g.camera_forward);
+  return state.hit_t[path] - g.camera.clip_start / axial;
 }
 
 }  // namespace relief

@@ -49,9 +49,11 @@ RELIEF_KERNEL void shade_surface_first_hit(const KernelGlobals& g,
   first.albedo = surface_summary<kFeatures>(at).albedo;
   first.uv = at.hit.uv[0];
   const Vec3f from_camera = at.hit.P - g.camera.world_from_camera.p;
-  first.depth = dot(from_camera, g.camera_forward);
-  const bool is_perspective = g.camera.projection == Projection::kPerspective;
-  if (layout.mist >= 0) first.mist = mist_eval(g.mist, is_perspective ? length(from_camera) : first.depth);
+  const Projection projection = g.camera.projection;
+  first.depth = __builtin_expect(projection == Projection::kPanoramic, 0) ? length(from_camera)
+                                                                          : dot(from_camera, g.camera_forward);
+  const bool by_distance = projection != Projection::kOrthographic;
+  if (layout.mist >= 0) first.mist = mist_eval(g.mist, by_distance ? length(from_camera) : first.depth);
   first.ray_length = state.hit_t[path];
   first.instance_index = state.hit_object[path];
   first.material_index = static_cast<std::uint32_t>(at.instance->material_index);

@@ -206,7 +206,7 @@ def _eyes(scene, engine):
         return {eye: read_rgb(f"{path}/picture_{eye}.exr") for eye in "LR"}
 
 
-def _assert_eyes_agree(scene):
+def assert_eyes_agree(scene):
     relief, cycles = _eyes(scene, "RELIEF"), _eyes(scene, "CYCLES")
     noise = 0.03
     for eye in "LR":
@@ -220,7 +220,7 @@ def test_stereoscopy():
     camera.data.stereo.interocular_distance, camera.data.stereo.convergence_distance = 1.0, 5.0
     for convergence in ("OFFAXIS", "PARALLEL", "TOE"):
         camera.data.stereo.convergence_mode = convergence
-        _assert_eyes_agree(scene)
+        assert_eyes_agree(scene)
 
 
 def test_views_by_several_cameras():
@@ -231,7 +231,7 @@ def test_views_by_several_cameras():
     other.name = "camera_R"
     scene.camera = camera
     scene.render.views["left"].camera_suffix, scene.render.views["right"].camera_suffix = "_L", "_R"
-    _assert_eyes_agree(scene)
+    assert_eyes_agree(scene)
 
 
 def test_render_region():

@@ -21,8 +21,6 @@ _MISSING = {
     "*: CyclesCurveRenderSettings.*subdivisions": "ribbons are as smooth as they are traced",
     "render: RenderSettings.hair_*": "of other engines",
     "render: operator *hair*": "of other engines",
-    "data: *.fisheye_*": "no panoramic cameras; a warning tells",
-    "data: *.panorama_type": "no panoramic cameras; a warning tells",
     "object: Object.is_shadow_catcher": "no shadow catchers; a warning tells",
     "view_layer: *.use_pass_shadow_catcher": "no shadow catchers",
     "*: *light*group*": "no light groups; a warning tells",
@@ -107,6 +105,16 @@ def _file():
     return scene
 
 
+def _panorama_of(camera):
+    return camera if hasattr(camera, "panorama_type") else camera.cycles
+
+
+def _panoramas(camera):
+    """Kinds of panoramic cameras that there are; None, which is no panoramic one, first."""
+    kinds = type(_panorama_of(camera)).bl_rna.properties["panorama_type"].enum_items
+    return [None, *(kind.identifier for kind in kinds)]
+
+
 def _states(scene):
     """(tab, members of the context) of each thing that the properties editor may show."""
     cube, world = bpy.data.objects["Cube"], scene.world
@@ -122,9 +130,14 @@ def _states(scene):
         scene.collection.objects.link(shown)
         for tab in ("object", "data"):
             yield tab, {**nothing, "light": light, "object": shown, "active_object": shown}
-    camera = scene.camera
-    for tab in ("object", "data"):
-        yield tab, {**nothing, "camera": camera.data, "object": camera, "active_object": camera}
+    for kind in _panoramas(scene.camera.data):
+        camera = scene.camera.copy()
+        camera.data = scene.camera.data.copy()
+        scene.collection.objects.link(camera)
+        if kind is not None:
+            camera.data.type, _panorama_of(camera.data).panorama_type = "PANO", kind
+        for tab in ("object", "data"):
+            yield tab, {**nothing, "camera": camera.data, "object": camera, "active_object": camera}
 
 
 def _context(engine, tab, members):

@@ -81,6 +81,36 @@ TEST(PictureShare, IsThePartThatASquareCovers)
   EXPECT_NEAR(share(square, orthographic), 4.0 / 64, 1e-6);
 }
 
+/// A panorama of all that is around: the ball's share of all directions, wherever it is.
+TEST(PictureShare, IsTheSolidAngleInAPanorama)
+{
+  Camera camera = camera_at(10);
+  camera.projection = Projection::kPanoramic;
+  camera.panorama.kind = PanoramaKind::kMirrorBall;
+  camera.half_width = camera.half_height = 1;
+  camera_fit(camera, 100, 100);
+  // A cap of half angle asin(1/10). The picture's square has the area of 4/π of its circle, which shows everything.
+  const double cap = (1 - std::sqrt(1 - 0.01)) / 2 * 3.14159265 / 4;
+  EXPECT_NEAR(share(Grid(64, true), camera), cap, 0.01 * cap);
+  camera.world_from_camera.x.x = camera.world_from_camera.z.z = -1;  // looks the other way
+  EXPECT_NEAR(share(Grid(64, true), camera), cap, 0.01 * cap);
+}
+
+TEST(PictureView, IsAsCoarseAsAPanoramaShows)
+{
+  Camera camera = camera_at(10);
+  camera.projection = Projection::kPanoramic;
+  camera.half_width = camera.half_height = 1;
+  camera_fit(camera, 200, 100);
+  // 200 pixels a turn, at the equator.
+  EXPECT_NEAR(PictureView(camera, 100).pixels({0, 0, 0}, {0.001f, 0, 0}), 0.001 / 10 * 100 / 3.14159265, 1e-6);
+  EXPECT_EQ(PictureView(camera, 100).coarsening({0, 0, 30}), 1);
+  camera.panorama.kind = PanoramaKind::kEquidistant;
+  camera.panorama.half_field = 0.5f;
+  EXPECT_EQ(PictureView(camera, 100).coarsening({1, 0, 0}), 1);
+  EXPECT_EQ(PictureView(camera, 100).coarsening({0.1, 0, 30}), PictureView::kUsualCoarsening);
+}
+
 /// Lengths are counted by the shorter side of a pixel, so that nothing is too coarse.
 TEST(PictureView, TakesTheShorterSideOfAPixel)
 {

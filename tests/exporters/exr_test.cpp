@@ -286,6 +286,8 @@ TEST_F(ExrTest, NumbersAndMatricesAreSuchToEveryReader)
   EXPECT_NEAR((on_screen - Imath::V3f(1 - 0.2f, 1, 2)).length(), 0, 1e-6);
   EXPECT_EQ(input.header().pixelAspectRatio(), 1.5f);
   EXPECT_FALSE(exr_load(file("a.exr")).attributes.contains("pixelAspectRatio"));
+  camera.projection = Projection::kPanoramic;
+  EXPECT_EQ(exr_camera_attributes(camera).size(), 1u) << "a panorama has no matrix, and no shape of its pixels";
   const Picture picture = exr_load(file("b.exr"));
   EXPECT_EQ(picture.attributes.at("pixelAspectRatio"), "1.5");
   EXPECT_EQ(picture.attributes.at("relief:seed"), "4000000001");

@@ -54,6 +54,50 @@ TEST(Layers, MistOfAPerspectiveIsByDistance)
   for (int x = 0; x < kSize; ++x) EXPECT_NEAR(*r.at(Aov::kMist, x, x), 0.5f, 1e-3f);
 }
 
+/// A panorama that shows all around in a circle, or the front half.
+Camera round_panorama(const Scene& scene, PanoramaKind kind)
+{
+  Camera camera = scene.cameras[0].camera;
+  camera.projection = Projection::kPanoramic;
+  camera.panorama.kind = kind;
+  camera.half_width = camera.half_height = 1;
+  camera_fit(camera, 1, 1);
+  return camera;
+}
+
+TEST(Layers, DepthAndMistOfAPanoramaAreByDistance)
+{
+  Scene scene = empty_scene();
+  Affine3 around_camera;
+  around_camera.p = {0, 0, 4};
+  add_object(scene, sphere_mesh(2, 256, 128, false), diffuse_material({0.5f, 0.5f, 0.5f}), around_camera);
+  scene.render.mist = {0, 4, MistFalloff::kLinear};
+  scene.cameras[0].camera = round_panorama(scene, PanoramaKind::kMirrorBall);
+  const Rendered r = render_scene(scene, render_options(scene, kSize, 4));
+  for (int x = 3; x < kSize - 3; ++x) {
+    EXPECT_NEAR(*r.at(Aov::kDepth, x, x), 2.0f, 2e-3f);
+    EXPECT_NEAR(*r.at(Aov::kMist, x, x), 0.5f, 1e-3f);
+  }
+}
+
+TEST(Layers, WhatALensDoesNotShowIsBlackAndCovered)
+{
+  Scene scene = empty_scene();
+  scene.environment.color = {0.25f, 0.5f, 0.75f};
+  scene.cameras[0].camera = round_panorama(scene, PanoramaKind::kEquidistant);
+  for (const bool is_shown : {true, false}) {
+    scene.environment.visible_to_camera = is_shown;
+    const Rendered r = render_scene(scene, render_options(scene, kSize, 16));
+    EXPECT_EQ(r.radiance(0, 0), (Vec3f{}));
+    EXPECT_EQ(r.at(Aov::kBeauty, 0, 0)[3], 1.0f);
+    EXPECT_EQ(r.at(Aov::kEnvironment, 0, 0)[1], 0.0f);
+    EXPECT_EQ(r.radiance(8, 8).y, is_shown ? 0.5f : 0.0f);
+    EXPECT_EQ(r.at(Aov::kBeauty, 8, 8)[3], 0.0f);
+    EXPECT_EQ(r.stats.counters.camera_rays, 16u * kSize * kSize) << "by these progress is told";
+    EXPECT_LT(r.stats.counters.background_hits, r.stats.counters.camera_rays);
+  }
+}
+
 TEST(Layers, EmissionAndEnvironmentAreWhatTheCameraSees)
 {
   Material glow = diffuse_material({0.5f, 0.5f, 0.5f});

@@ -173,11 +173,12 @@ TEST(Dicing, LooksAtEveryInstance)
   std::mt19937 random(8);
   std::uniform_real_distribution<float> uniform(-1, 1);
   const auto vector = [&] { return Vec3f{uniform(random), uniform(random), uniform(random)}; };
-  for (const Projection projection : {Projection::kPerspective, Projection::kOrthographic}) {
+  for (const Projection projection : {Projection::kPerspective, Projection::kOrthographic, Projection::kPanoramic}) {
     for (const float half : {0.001f, 0.4f}) {
       Camera camera;
       camera.projection = projection;
       camera.half_width = camera.half_height = half;
+      camera.panorama.kind = PanoramaKind::kEquidistant;
       const PictureView view(camera, 500, 1 + 5 * std::abs(static_cast<double>(uniform(random))));
       const Mesh mesh = quad_mesh({-1, -1, 0}, {2, 0, 0}, {0, 2, 0});
       std::vector<Affine3> instances;

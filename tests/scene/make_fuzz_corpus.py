@@ -221,10 +221,17 @@ def lights():
              "apertureRadius": .01, "apertureBlades": 6, "apertureRotation": 1, "apertureRatio": 2, "pixelAspect": 1.5,
              "focusDistance": 2, "shift": [.1, 0], "clip": [.1, 9]}}},
         {"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 2, "znear": 0, "zfar": 9}}]
+    panoramas = [{"longitude": [-1, 2], "latitude": [0, 1], "window": [2, 2]}, {"type": "cylindrical", "heights": [-1, 2]},
+                 {"type": "equidistant", "fieldOfView": 3}, {"type": "equisolid", "sensor": [36, 24], "focalLength": 9},
+                 {"type": "polynomial", "coefficients": [0, .1, 0, 0, 0]}, {"type": "mirror-ball"}, {"type": "cube-face"}]
+    for panorama in panoramas:
+        b.json["cameras"].append({"type": "perspective", "perspective": {"yfov": .7, "znear": .1},
+                                  "extensions": {"RELIEF_camera": {"panorama": panorama}}})
     for i in range(3):
         b.node(name=f"light {i}", rotation=[0, .7071, 0, .7071], extensions={"KHR_lights_punctual": {"light": i}})
     b.node(camera=0, translation=[0, 0, 4])
-    b.node(camera=1)
+    for i in range(1, len(b.json["cameras"])):
+        b.node(camera=i)
     profile = {"type": "ies-texture", "uri": "profile.ies", "inputs": {"strength": 2, "vector": [0, 0, 1]}}
     falloff = {"type": "light-falloff", "inputs": {"strength": {"node": 0}, "smooth": 1}}
     graph = {"nodes": [profile, falloff], "outputs": {"emission": {"node": 1, "output": "linear"}}}

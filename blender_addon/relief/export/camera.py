@@ -4,6 +4,8 @@
 import math
 from dataclasses import dataclass
 
+from .. import compat
+
 @dataclass(frozen=True)
 class Frame:
     """A whole picture: its size in pixels, and a pixel's width over its height."""
@@ -11,6 +13,22 @@ class Frame:
     width: int
     height: int
     pixel_aspect: float
+
+
+@dataclass(frozen=True)
+class Window:
+    """What a camera sees of the plane that the picture is on.
+
+    half_height  in metres, or at distance 1 for a perspective
+    aspect       width over height
+    shift        in fractions of width and height
+    sensor       width and height in millimetres of what the picture covers
+    """
+
+    half_height: float
+    aspect: float
+    shift: tuple
+    sensor: tuple
 
 
 #: Blender's focal lengths and sensors are in millimetres.
@@ -26,26 +44,67 @@ def camera_json(camera, own_shift, frame, focus_distance, warn):
     @param  focus_distance  metres along the camera's axis
     @param  warn            called with what is not understood, and what was used instead
     """
+    if camera.type not in {"PERSP", "ORTHO", "PANO"}:
+        warn(f"a camera of the kind {camera.type.lower()}", "a perspective one with its focal length was used")
+    window = window_of(camera, own_shift, frame)
+    clip = (camera.clip_start, camera.clip_end)
+    out = lens_json(camera.type == "ORTHO", window.half_height, window.aspect, window.shift, clip)
+    out["name"] = camera.name
+    extension = out["extensions"]["RELIEF_camera"]
+    extension.update(aperture(camera, focus_distance))
+    if camera.type == "PANO" and (shown := panorama(camera, window, warn)) is not None:
+        # It fills the picture, whatever that is shaped like, and shifts are parts of either side.
+        extension.update({"panorama": shown, "shift": list(own_shift)})
+    elif frame.pixel_aspect != 1:
+        extension["pixelAspect"] = frame.pixel_aspect
+    return out
+
+
+def window_of(camera, own_shift, frame):
+    """Window of a bpy camera, as if it were a perspective one if it is neither that nor orthographic. Arguments as in camera_json."""
     aspect = frame.width * frame.pixel_aspect / frame.height
     is_horizontal = camera.sensor_fit == "HORIZONTAL" or (camera.sensor_fit == "AUTO" and aspect >= 1)
     # Blender's lengths (sensor, orthographic scale, shift) are fractions of one side of the picture, the fitted one.
     by_width, by_height = (1.0, aspect) if is_horizontal else (1 / aspect, 1.0)
+    # AUTO always measures with the sensor's width.
+    sensor = camera.sensor_height if camera.sensor_fit == "VERTICAL" else camera.sensor_width
     if camera.type == "ORTHO":
         half_height = camera.ortho_scale / 2 / by_height
     else:
-        if camera.type != "PERSP":
-            warn("a panoramic camera", "a perspective one with its focal length was used")
-        # AUTO always measures with the sensor's width.
-        sensor = camera.sensor_height if camera.sensor_fit == "VERTICAL" else camera.sensor_width
         half_height = 0.5 * sensor / camera.lens / by_height
-    shift = (own_shift[0] * by_width, own_shift[1] * by_height)
-    clip = (camera.clip_start, camera.clip_end)
-    out = lens_json(camera.type == "ORTHO", half_height, aspect, shift, clip)
-    out["name"] = camera.name
-    if frame.pixel_aspect != 1:
-        out["extensions"]["RELIEF_camera"]["pixelAspect"] = frame.pixel_aspect
-    out["extensions"]["RELIEF_camera"].update(aperture(camera, focus_distance))
-    return out
+    return Window(half_height, aspect, (own_shift[0] * by_width, own_shift[1] * by_height), (sensor / by_width, sensor / by_height))
+
+
+def panorama(camera, window, warn):
+    """The part of RELIEF_camera that makes a panoramic camera; None for a kind that is not understood.
+
+    @param  window  Window
+    @param  warn    as in camera_json
+    """
+    lens = compat.panorama_of(camera)
+    kind = lens.panorama_type if lens is not None else "unknown"
+    if kind in {"MIRRORBALL", "EQUIANGULAR_CUBEMAP_FACE"}:
+        return {"type": "mirror-ball" if kind == "MIRRORBALL" else "cube-face"}
+    if kind == "EQUIRECTANGULAR":
+        longitude, latitude = [lens.longitude_min, lens.longitude_max], [lens.latitude_min, lens.latitude_max]
+        return {"type": "equirectangular", "longitude": longitude, "latitude": latitude}
+    if kind == "CENTRAL_CYLINDRICAL":
+        low, high = (getattr(lens, f"central_cylindrical_range_{end}") for end in ("v_min", "v_max"))
+        longitude = [lens.central_cylindrical_range_u_min, lens.central_cylindrical_range_u_max]
+        heights = [low / lens.central_cylindrical_radius, high / lens.central_cylindrical_radius]
+        return {"type": "cylindrical", "longitude": longitude, "heights": heights}
+    out = {"fieldOfView": lens.fisheye_fov} if lens is not None else {}
+    if kind == "FISHEYE_EQUIDISTANT":
+        return {"type": "equidistant", **out}
+    out["sensor"] = list(window.sensor)
+    if kind == "FISHEYE_EQUISOLID":
+        return {"type": "equisolid", **out, "focalLength": lens.fisheye_lens}
+    if kind == "FISHEYE_LENS_POLYNOMIAL":
+        # Blender's give the angle's negative.
+        coefficients = [-getattr(lens, f"fisheye_polynomial_k{i}") for i in range(5)]
+        return {"type": "polynomial", **out, "coefficients": coefficients}
+    warn(f"a panoramic camera of the kind {kind.lower()}", "a perspective one with its focal length was used")
+    return None
 
 
 def lens_json(is_orthographic, half_height, aspect, shift, clip):

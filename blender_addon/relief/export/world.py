@@ -38,7 +38,7 @@ class Eye:
         @param  camera, matrix, size  of a View
         """
         extension = camera.get("extensions", {}).get("RELIEF_camera")
-        if camera["type"] != "perspective" or extension is None:
+        if camera["type"] != "perspective" or extension is None or "panorama" in extension:
             return None
         columns = np.array(matrix, dtype=np.float64)[:3, :3]
         right, up, back = (columns / np.linalg.norm(columns, axis=0)).T
