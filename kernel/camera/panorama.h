@@ -171,7 +171,8 @@ RELIEF_KERNEL Vec2f panorama_project(const Panorama& p, Vec3f D)
 {
   const float across = __builtin_sqrtf(D.x * D.x + D.y * D.y);
   const float angle = angle_of(across, -D.z);
-  const Vec2f towards = across > 0.0f ? Vec2f{D.x / across, D.y / across} : Vec2f{};
+  // What is straight behind is at the side, not in the middle.
+  const Vec2f towards = across > 0.0f ? Vec2f{D.x / across, D.y / across} : Vec2f{1, 0};
   const auto on_sensor = [&](float radius) {
     return Vec2f{towards.x * radius / p.half_sensor_width, towards.y * radius / p.half_sensor_height};
   };

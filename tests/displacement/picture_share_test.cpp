@@ -108,7 +108,7 @@ TEST(PictureView, IsAsCoarseAsAPanoramaShows)
   camera.panorama.kind = PanoramaKind::kEquidistant;
   camera.panorama.half_field = 0.5f;
   EXPECT_EQ(PictureView(camera, 100).coarsening({1, 0, 0}), 1);
-  EXPECT_EQ(PictureView(camera, 100).coarsening({0.1, 0, 30}), PictureView::kUsualCoarsening);
+  EXPECT_EQ(PictureView(camera, 100).coarsening({0, 0, 30}), PictureView::kUsualCoarsening);
 }
 
 /// Lengths are counted by the shorter side of a pixel, so that nothing is too coarse.

@@ -131,6 +131,14 @@ TEST(Panorama, ProjectingUndoesLooking)
   }
 }
 
+TEST(Panorama, StraightBehindIsNotInTheMiddle)
+{
+  for (const PanoramaKind kind : {PanoramaKind::kEquidistant, PanoramaKind::kEquisolid, PanoramaKind::kMirrorBall}) {
+    const Vec2f behind = panorama_project(panorama(kind), {0, 0, 1});
+    EXPECT_GE(std::abs(behind.x), 0.9999f) << static_cast<int>(kind);
+  }
+}
+
 /// By the solid angle of a small parallelogram.
 TEST(Panorama, KnowsTheSolidAngleOfAPoint)
 {
