@@ -307,6 +307,7 @@ const StageTable kTable = {
      shade_surfaces<kSurfaceKernelFeatures[10]>, shade_surfaces<kSurfaceKernelFeatures[11]>},
     RELIEF_SHADE_MEDIA,
     RELIEF_SHADE_PHOTON_MEDIA,
+    &RELIEF_WALK_STAGES,
     RELIEF_LEAVE_SURFACES,
     shade_backgrounds,
     shade_lights,

@@ -13,7 +13,8 @@
 
 namespace relief {
 
-struct TraversalTable;  // displacement/embree_geometry.h
+struct SubsurfaceWalks;  // kernel/stage/subsurface_walk.h
+struct TraversalTable;   // displacement/embree_geometry.h
 
 /// Surface kernels are instantiated for a few feature masks, in rising order of what they can do.
 inline constexpr int kNumSurfaceKernels = 12;
@@ -32,6 +33,13 @@ struct HitQueues {
   const std::uint8_t* surface_kernel = nullptr;  ///< of each material, index of its kernel
   std::array<QueueView, kNumSurfaceKernels> surfaces;
   QueueView lights, background;
+};
+
+/// Steps of eight walks below surfaces; between `choose` and `go` integrator/subsurface_stage.h asks what they meet.
+struct WalkStages {
+  bool (*begin)(const PathState&, std::uint32_t path, SubsurfaceWalks&, int lane);
+  void (*choose)(SubsurfaceWalks&);
+  void (*go)(SubsurfaceWalks&);
 };
 
 struct StageTable {
@@ -53,6 +61,7 @@ struct StageTable {
                              HitQueues& queues,
                              QueueView& next,
                              PhotonQueueView& photons);
+  const WalkStages* walks;
   /// Lights and scatters paths that have walked below a surface and got out.
   void (*leave_surfaces)(const KernelGlobals&,
                          PathState&,
@@ -127,6 +136,9 @@ Vec3f shadow_transmittance_avx2(const KernelGlobals& g,
                                 const ShadowWay& way,
                                 float from,
                                 float to);
+
+extern const WalkStages walk_stages_baseline;
+extern const WalkStages walk_stages_avx2;
 
 /// See StageTable::leave_surfaces.
 void leave_surfaces_baseline(

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "integrator/intersect_stage.h"
+#include "integrator/stages.h"
 
 namespace relief {
 
@@ -10,12 +11,9 @@ namespace relief {
 /// against the way that they came.
 /// @param left          gets these; the others end
 /// @param displacement  what these rays did is added to it
-/// @source  Chiang, Kutz, Burley 2016, "Practical and Controllable Subsurface Scattering for Production Path Tracing"; Křivánek and
-///          d'Eon 2014, "A Zero-variance-based Sampling Scheme for Monte Carlo Subsurface Scattering"; Meng, Hanika, Dachsbacher 2016,
-///          "Improving the Dwivedi Sampling Scheme"; d'Eon and Křivánek 2020, "Zero-Variance Theory for Efficient Subsurface
-///          Scattering"; put together as in Cycles
 void walk_below_surfaces(const KernelGlobals& g,
                          const Accel& accel,
+                         const WalkStages& stages,
                          PathState& state,
                          const QueueView& queue,
                          QueueView& left,

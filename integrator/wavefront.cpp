@@ -208,7 +208,7 @@ bool Wavefront::run(const KernelGlobals& g,
     if (QueueView& entered = state_.subsurface.entered; entered.size > 0) {
       charge(Stage::kShade);
       QueueView left{subsurface_memory_->left};
-      walk_below_surfaces(g, accel, state_, entered, left, displacement);
+      walk_below_surfaces(g, accel, *stages.walks, state_, entered, left, displacement);
       entered.size = 0;
       charge(Stage::kIntersectClosest);
       if (g.caustics.enabled) stages.gather_photons(g, state_, left);

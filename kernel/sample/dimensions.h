@@ -88,9 +88,16 @@ RELIEF_KERNEL constexpr std::uint32_t dimension_photon(PhotonDimension use)
   return 0x40000000u + static_cast<std::uint32_t>(use);
 }
 
-/// @param number  of the numbers of a walk below a surface
-/// @return        dimension for sample_1d
-RELIEF_KERNEL constexpr std::uint32_t dimension_below(std::uint32_t number) { return 0x80000000u + number; }
+/// Numbers of a walk below a surface that are stratified, and of a probe: pairs.
+inline constexpr int kPairsBelow = 12;
+
+/// @param bounce  surfaces that the path has met before
+/// @param pair    below kPairsBelow
+/// @return        dimension for sample_1d or sample_2d, as the use says
+RELIEF_KERNEL constexpr std::uint32_t dimension_below(int bounce, int pair)
+{
+  return 0x80000000u + static_cast<std::uint32_t>(bounce * kPairsBelow + pair);
+}
 
 /// @param bounce  surfaces that the path has met before, see path_surface
 /// @return        dimension for sample_1d or sample_2d, as the use says
