@@ -12,6 +12,7 @@ struct MixtureBuildLanes {
   Vec3x8 wo, Ng, Ns;
   const BsdfTables* tables = nullptr;  ///< for closures since 4.0
   I8 is_front = ~I8{};
+  bool on_curves = false;  ///< they are met on strands
 };
 
 RELIEF_KERNEL F8 lerp(F8 t, F8 a, F8 b) { return (1.0f - t) * a + t * b; }
@@ -54,10 +55,11 @@ RELIEF_KERNEL F8 least_reflected_height(F8 height_o) { return min(0.9f * height_
   return select(is_above, N, select(aside_squared > 1e-12f, normalize(middle), b.Ng));
 }
 
-/// As closure_normal on triangles.
+/// As closure_normal.
 RELIEF_KERNEL Vec3x8 closure_normal(const MixtureBuildLanes& b, const Vec3x8& given)
 {
   const Vec3x8 N = closure_normal_as_given(b, given);
+  if (b.on_curves) return N;
   const F8 height_o = dot(b.Ng, b.wo);
   const I8 is_above = 2.0f * dot(N, b.wo) * dot(N, b.Ng) - height_o >= least_reflected_height(height_o);
   if (mask_of(is_above) == 0xffu) [[likely]]

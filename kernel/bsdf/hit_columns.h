@@ -136,14 +136,19 @@ struct LobeReach8 {
 };
 
 /// As mixture_reaches.
-/// @param is_own  directions were sampled from the column's lobes, and leave by the true surface
-RELIEF_KERNEL LobeReach8 lobe_column_reach(const LobeColumnKind& is, const LobeSides8& at, I8 is_own)
+/// @param on_curves  of LobeColumns
+/// @param is_own     directions were sampled from the column's lobes, and leave by the true surface
+RELIEF_KERNEL LobeReach8 lobe_column_reach(const LobeColumnKind& is, bool on_curves, const LobeSides8& at, I8 is_own)
 {
   const MixtureTraits& traits = mixture_traits(is.kind);
   const I8 by_Ns = ~(at.above ^ at.above_Ns), by_Ng = ~(at.above ^ at.above_Ng);  // on the same side
   const I8 is_meant = traits.sides == LobeSides::kReflect    ? at.above
                       : traits.sides == LobeSides::kTransmit ? ~at.above
                                                              : ~I8{};
+  if (on_curves) {
+    const I8 asks = is.maths == Maths::k43 && traits.is_microfacet ? is_meant & by_Ng : is_meant;
+    return {asks | is_own, is_meant | is_own};
+  }
   if (!traits.is_microfacet) {
     const I8 asks = is.maths >= Maths::k52 ? is_meant & by_Ns : is_meant;
     return {asks | is_own, (asks & by_Ng) | is_own};
@@ -205,7 +210,7 @@ template <bool kSplits>
       projected = cos_i / cos_surface;
     }
     const I8 is_own = sampled != nullptr ? sampled->of[i] : I8{};
-    const LobeReach8 reach = lobe_column_reach(lobe.is, at, is_own);
+    const LobeReach8 reach = lobe_column_reach(lobe.is, h.lobes.on_curves, at, is_own);
     const F8 probability = load8(lobe.probability);
     F8 pdf, f;
     I8 is_there = is_seen & load8(lobe.is_there);
@@ -223,7 +228,9 @@ template <bool kSplits>
     }
     if (is_diffuse) {
       // In Cycles what is sampled through the surface does not fade.
-      const I8 is_bent = is_there & (goes_through ? ~at.above & ~is_own : at.above) & load8(frames.is_bent);
+      const bool may_bend = !(h.lobes.on_curves && lobe.is.maths >= Maths::k52);
+      const I8 is_bent =
+          !may_bend ? I8{} : is_there & (goes_through ? ~at.above & ~is_own : at.above) & load8(frames.is_bent);
       if (mask_of(is_bent) != 0) {
         const Vec3x8 N = load8(frames.surface_N);
         const F8 fades = lobe.is.maths >= Maths::k52 ? bump_shadowing_ggx(N, wi_lobe) : bump_shadowing(N, wi_lobe);
@@ -244,7 +251,7 @@ template <bool kSplits>
     if constexpr (kSplits) {
       // What is sharp of a sampled direction is asked as if it had not been sampled: photons would not be.
       const I8 is_sharp = (load8(lobe.roughness) <= load8(h.most_sharp)) & (load8(lobe.roughness) < kInfinity);
-      const I8 is_asked = is_sharp & lobe_column_reach(lobe.is, at, I8{}).asks;
+      const I8 is_asked = is_sharp & lobe_column_reach(lobe.is, h.lobes.on_curves, at, I8{}).asks;
       sharp = select(is_asked, sharp + part, sharp);
       soft = select(is_sharp, soft, soft + part);
     }
@@ -342,7 +349,7 @@ template <bool kSplits>
                        lobe.is.kind == MixtureLobeKind::kBeckmann
                            ? beckmann_sample(alpha_x, alpha_y, wo, choice.u, u_y, is_chosen & ~is_delta)
                            : ggx_anisotropic_sample(alpha_x, alpha_y, wo, choice.u, u_y));
-        if (!lobe.is.mirrors_below) is_lost |= is_chosen & (local.z < 0.0f);
+        if (!lobe.is.mirrors_below || h.lobes.on_curves) is_lost |= is_chosen & (local.z < 0.0f);
       }
       width = is_delta ? none : is_chosen ? roughness * roughness : width;
       lobe_bits = is_delta ? bits(kLobeDelta) : is_chosen ? bits(kLobeGlossy) : lobe_bits;
@@ -358,8 +365,9 @@ template <bool kSplits>
   const Vec3x8 wi_surface = to_local(load_frame8(h.side), wi);
   const F8 cos_surface = abs(wi_surface.z);
   const auto agrees = [&](F8 height) { return (height >= 0.0f) ^ is_through; };
-  const I8 is_found = (choice.sum > 0.0f) & (agrees(dot(wi, load8(h.Ng))) | is_free) & (cos_surface > kMinCosine) &
-                      ~is_lost & (~by_Ns | agrees(wi_surface.z));
+  const I8 is_reached =
+      h.lobes.on_curves ? ~I8{} : (agrees(dot(wi, load8(h.Ng))) | is_free) & (~by_Ns | agrees(wi_surface.z));
+  const I8 is_found = (choice.sum > 0.0f) & is_reached & (cos_surface > kMinCosine) & ~is_lost;
   store8(h.wi, wi_surface);
   store8(h.width, width);
   store8(h.bits, lobe_bits | (is_through ? bits(kLobeTransmit) : bits(kLobeReflect)));

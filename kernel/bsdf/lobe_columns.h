@@ -54,6 +54,7 @@ struct alignas(32) LobeFrames {
 struct LobeColumns {
   std::uint64_t closures = 0;  ///< of the material, that they are resolved of, bit by bit
   int num_lobes = 0, num_frames = 0;
+  bool on_curves = false;              ///< as MixtureLobe::is_on_curve, of all
   LobeColumn lobes[kMostLobeColumns];  ///< in the order in which they are sampled
   LobeFrames frames[kMostLobeColumns];
 };
@@ -62,6 +63,7 @@ struct LobeColumns {
 RELIEF_KERNEL void lobe_columns_begin(LobeColumns& c)
 {
   c.closures = 0;
+  c.on_curves = false;
   c.num_lobes = c.num_frames = 0;
 }
 

@@ -279,6 +279,7 @@ RELIEF_KERNEL void closure_add_columns(const GraphProgramView& program,
 {
   lobe_columns_begin(columns);
   columns.closures = closures;
+  columns.on_curves = b.on_curves;
   for (std::uint64_t left = closures; left != 0; left &= left - 1) {
     const int i = __builtin_ctzll(left), before = columns.num_lobes;
     closure_add_columns(program, program.closures[i], registers, b, columns);

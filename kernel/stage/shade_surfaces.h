@@ -22,6 +22,14 @@ RELIEF_KERNEL void surface_group_visit(const SurfaceGroup& group, F&& f)
   for (unsigned left = group.lanes; left != 0; left &= left - 1) f(__builtin_ctz(left));
 }
 
+/// Whether all of a group are met on strands.
+RELIEF_KERNEL bool group_is_on_curves(const SurfaceGroup& group)
+{
+  bool on_curves = true;
+  surface_group_visit(group, [&](int k) { on_curves = on_curves && has_strands(*group.at[k].instance); });
+  return on_curves;
+}
+
 /// What closures of a group are resolved for.
 RELIEF_KERNEL MixtureBuildLanes surface_group_build(const KernelGlobals& g,
                                                     const PathState& state,
@@ -36,7 +44,8 @@ RELIEF_KERNEL MixtureBuildLanes surface_group_build(const KernelGlobals& g,
     store_lane(numbers + 6, k, shading_normal_turned(at.hit.Ns, at.side.Ng));
     is_front[k] = at.side.front ? -1 : 0;
   });
-  return {load8(numbers), load8(numbers + 3), load8(numbers + 6), g.bsdf_tables, load8(is_front)};
+  return {load8(numbers), load8(numbers + 3), load8(numbers + 6),
+          g.bsdf_tables,  load8(is_front),    group_is_on_curves(group)};
 }
 
 /// Whether a group's closures may be columns: fewer hits are not worth it, and layers of light by its first event want parts of
@@ -54,8 +63,9 @@ RELIEF_KERNEL bool surface_group_is_resolved(const KernelGlobals& g,
                                              std::uint64_t closures)
 {
   bool is_resolved = group_has_columns(state, group) && closures_scatter_alone(group.program, closures);
+  const bool on_curves = group_is_on_curves(group);
   surface_group_visit(group, [&](int k) {
-    is_resolved = is_resolved && (group.at[k].instance->flags & kCurves) == 0 &&
+    is_resolved = is_resolved && has_strands(*group.at[k].instance) == on_curves &&
                   path_does_without(g, state.flags[group.paths[k]]) == 0;
   });
   return is_resolved;

@@ -376,7 +376,7 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   side.bent = !(dot(side.Ns, shading_normal_turned(at.hit.Ns, side.Ng)) > kUnbent);
   side.frame = lobes_side(lobes, side.Ns);
   if (build.lobes != nullptr || lane.program->num_closures > 1) {
-    const bool has_all = build.reflects && build.refracts && is_zero(build.tangent);
+    const bool has_all = build.lobes == nullptr || (build.reflects && build.refracts && is_zero(build.tangent));
     closures_resolve(lane, build, has_all ? columns : nullptr);
   }
   if (blur.alpha > 0.0f) lobes_blur(lobes, blur.alpha, blur.most_sharp);

@@ -189,6 +189,34 @@ TEST(SurfaceGroups, ThatLightGoesThroughMakeTheSamePictureAsOnes)
   EXPECT_GT(compare_with_ones(scene_of(clear_materials())).transparent_hits, 5u);
 }
 
+/// Strands in the place of balls, some of them flat, some of them round; on the floor, too, there are some.
+TEST(SurfaceGroups, OnStrandsMakeTheSamePictureAsOnes)
+{
+  for (const auto& materials : {plain_materials(), clear_materials()}) {
+    Scene scene = scene_of(materials);
+    for (std::size_t i = 1; i < materials.size(); ++i) {
+      const float k = static_cast<float>(i) - 1;
+      const Vec3f middle{0.7f * std::fmod(k, 4.0f) - 1.05f, -0.1f + 0.6f * std::floor(k / 4), 0};
+      Mesh mesh;
+      mesh.material_index = scene.meshes[i].material_index;
+      mesh.are_ribbons = i % 2 == 1;
+      for (int strand = 0; strand < 3; ++strand) {
+        const auto first = static_cast<std::uint32_t>(mesh.P.size());
+        for (int point = 0; point < 5; ++point) {
+          const float y = 0.15f * (static_cast<float>(point) - 2), x = 0.2f * static_cast<float>(strand - 1);
+          mesh.P.push_back(middle + Vec3f{x + y * y, y, 0.3f * x});
+          mesh.radius.push_back(0.08f);
+        }
+        for (std::uint32_t segment = 1; segment < 3; ++segment) {
+          mesh.triangles.push_back({first + segment, first + segment + 1, first + segment});
+        }
+      }
+      scene.meshes[i] = mesh;
+    }
+    EXPECT_GT(compare_with_ones(scene).surface_hits, 200u);
+  }
+}
+
 TEST(SurfaceGroups, ThatPathsLeaveMakeTheSamePictureAsOnes)
 {
   const Scene scene = scene_of(waxen_materials(), bumped_nodes());
