@@ -44,6 +44,8 @@ void sort_hit(const KernelGlobals& g,
               HitQueues& queues)
 {
   if (object == RTC_INVALID_GEOMETRY_ID) {
+    // What hides surfaces behind a camera's far end hides no media.
+    state.hit_t[path] = kInfinity;
     queue_push(queues.background, path);
     return;
   }

@@ -167,8 +167,10 @@ def test_camera_within():
     assert_agrees(scene, samples=64)
 
 
-def test_world():
+def _fog(far_end):
+    """A camera, a lamp and a ball in fog that has no end."""
     scene = _scene(1, 1)
+    scene.camera.data.clip_end = far_end
     add_plane(20)
     add_light("POINT", (1.0, 0, 2.0), energy=150.0, shadow_soft_size=0.3)
     add_sphere(0.7, diffuse((0.7, 0.3, 0.2)), (-0.5, 0, 1.2))
@@ -177,6 +179,17 @@ def test_world():
     scatter.inputs["Color"].default_value = (0.8, 0.85, 0.9, 1)
     scatter.inputs["Density"].default_value = 0.06
     tree.links.new(scatter.outputs[0], tree.nodes["World Output"].inputs["Volume"])
+    return scene
+
+
+def test_world():
+    assert_agrees(_fog(100), samples=64)
+
+
+def test_world_beyond_the_far_end():
+    """What is behind the camera's far end is not seen, but for the fog there, which hides the sky."""
+    scene = _fog(7.5)
+    bpy.data.lights[0].energy = 600.0
     assert_agrees(scene, samples=64)
 
 
