@@ -21,14 +21,39 @@ RELIEF_KERNEL float disk_light_solid_angle(const Light& light, Vec3f P)
   return omega >= kDiskRectangleSolidAngle ? omega : 0.0f;
 }
 
+/// Of a disk with a spread, the radius about a point's foot on its plane in which it shines to the point, where that is less than
+/// the disk itself; metres.
+/// @return  0: all of the disk is sampled
+RELIEF_KERNEL float disk_light_reach(const Light& light, Vec3f P)
+{
+  if (!(light.spread_tan > 0.0f)) return 0.0f;
+  const float reach = light_spread_reach(light, P);
+  return kPi * sqr(reach) < light.area ? reach : 0.0f;
+}
+
 /// @param u  [0, 1)²
 /// @return   along the half axes, uniform by area
 RELIEF_KERNEL Vec2f light_coordinates(DiskLight, Vec2f u) { return warp_disk(u); }
+
+/// Samples what shines to a point, by area; what of that is beyond the disk is lost.
+/// @param reach  of disk_light_reach
+/// @param u      [0, 1)²
+[[gnu::noinline]] RELIEF_KERNEL LightSample disk_light_sample_near(const Light& light, Vec3f P, float reach, Vec2f u)
+{
+  const Vec2f q = reach * warp_disk(u);
+  const Frame frame = frame_from_normal(light.axis);
+  const Vec3f point = P - dot(P - light.P, light.axis) * light.axis + frame.s * q.x + frame.t * q.y;
+  if (const Vec2f at = plate_light_meet(light, P, point - P).q; !(sqr(at.x) + sqr(at.y) <= 1.0f)) return {};
+  LightSample sample = light_point_sample(light, P, point);
+  sample.pdf *= light.area / (kPi * sqr(reach));
+  return sample;
+}
 
 /// @param u  [0, 1)²
 RELIEF_KERNEL LightSample light_sample(DiskLight kind, const Light& light, Vec3f P, Vec2f u)
 {
   if (!light_faces(light, P)) return {};
+  if (const float reach = disk_light_reach(light, P); reach > 0.0f) return disk_light_sample_near(light, P, reach, u);
   const float omega = disk_light_solid_angle(light, P);
   if (!(omega > 0.0f)) {
     const Vec2f q = light_coordinates(kind, u);
@@ -46,6 +71,9 @@ RELIEF_KERNEL LightSample light_sample(DiskLight kind, const Light& light, Vec3f
 RELIEF_KERNEL float light_pdf(DiskLight, const Light& light, Vec3f P, Vec3f wi, float distance)
 {
   if (!light_faces(light, P)) return 0.0f;
+  if (const float reach = disk_light_reach(light, P); reach > 0.0f) {
+    return light_area_pdf(light, wi, distance) * (light.area / (kPi * sqr(reach)));
+  }
   const float omega = disk_light_solid_angle(light, P);
   return omega > 0.0f ? 1.0f / omega : light_area_pdf(light, wi, distance);
 }

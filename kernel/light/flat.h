@@ -107,9 +107,11 @@ RELIEF_KERNEL LightBounds flat_light_bounds(const Light& light, float emission, 
   LightProfile profile = two_sided ? kTwoSidedProfile : kFlatProfile;
   bounds.is_flat = true;
   if (light.spread_tan > 0.0f) {
-    // Brighter along the axis, and nothing beyond the spread.
+    // Brighter along the axis, and nothing beyond the spread. A narrow beam is as bright near by as far away, and estimates do not
+    // know how narrow: by all of its intensity it would be chosen where it does not shine, and no other lamp.
+    constexpr float kMostPeak = 8.0f;
     bounds.falloff = std::atan(light.spread_tan);
-    bounds.intensity *= light.spread_tan * light.spread_scale;
+    bounds.intensity *= min(light.spread_tan * light.spread_scale, kMostPeak);
     profile = light_cone_profile(std::cos(0.5f * bounds.falloff));
     if (two_sided) profile = {2.0f * profile.mean, 0.0f};
     bounds.is_flat = false;
@@ -161,15 +163,29 @@ RELIEF_KERNEL Vec2f light_uv(PlateLight, const Light& light, const Affine3&, Lig
   return {0.5f + scale * dot(cross(q, light.edge_v), normal), 0.5f + scale * dot(cross(light.edge_u, q), normal)};
 }
 
+/// How far from the foot of a point on a plate's plane that still shines to it, of a light with a spread; metres.
+RELIEF_KERNEL float light_spread_reach(const Light& light, Vec3f P)
+{
+  return light.spread_tan * __builtin_fabsf(dot(P - light.P, light.axis));
+}
+
 /// @param q     place, in coordinates along the half axes
 /// @param v     [0, 1)²: direction
 /// @param back  of two sides, the other one
 RELIEF_KERNEL LightRay plate_light_emit(const Light& light, Vec2f q, Vec2f v, bool back)
 {
-  const Vec3f local = warp_cosine_hemisphere(v);
+  Vec3f local = warp_cosine_hemisphere(v);
+  float weight = 1.0f;
+  if (light.spread_tan > 0.0f) {
+    // Within the spread alone.
+    const float sine_squared = sqr(light.spread_tan) / (1.0f + sqr(light.spread_tan)),
+                sine = __builtin_sqrtf(sine_squared);
+    local = {local.x * sine, local.y * sine, __builtin_sqrtf(1.0f - sine_squared * (sqr(local.x) + sqr(local.y)))};
+    weight = sine_squared * light_spread(light, local.z);
+  }
   const Vec3f axis = light.two_sided && back ? -light.axis : light.axis;
   const Vec3f P = light.P + light.edge_u * q.x + light.edge_v * q.y;
-  return {P, from_local(frame_from_normal(axis), local), light_spread(light, local.z)};
+  return {P, from_local(frame_from_normal(axis), local), weight};
 }
 
 }  // namespace relief

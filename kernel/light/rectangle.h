@@ -84,6 +84,30 @@ RELIEF_KERNEL Vec3f rectangle_light_point(const Light& light, Vec3f P, float ome
          y_axis * (clamp(static_cast<float>(yv), cy - half_y, cy + half_y) - cy);
 }
 
+/// What of a rectangle with a spread shines to a point, or a little more: a rectangle along the same axes.
+/// @param storage  gets it
+/// @return         null: nothing shines there
+[[gnu::noinline]] RELIEF_KERNEL const Light* rectangle_light_part(const Light& light, Vec3f P, Light& storage)
+{
+  const Vec3f normal = cross(light.edge_u, light.edge_v);
+  const float inv_squared = 1.0f / length_squared(normal), reach = light_spread_reach(light, P);
+  float middle[2], half[2];
+  const Vec3f duals[2] = {cross(light.edge_v, normal) * inv_squared, cross(normal, light.edge_u) * inv_squared};
+  for (int i = 0; i < 2; ++i) {
+    const float foot = dot(P - light.P, duals[i]), extent = reach * length(duals[i]);
+    const float low = max(foot - extent, -1.0f), high = min(foot + extent, 1.0f);
+    if (!(low < high)) return nullptr;
+    middle[i] = 0.5f * (low + high);
+    half[i] = 0.5f * (high - low);
+  }
+  storage = light;
+  storage.P += light.edge_u * middle[0] + light.edge_v * middle[1];
+  storage.edge_u *= half[0];
+  storage.edge_v *= half[1];
+  storage.area *= half[0] * half[1];
+  return &storage;
+}
+
 /// @param u  [0, 1)²
 /// @return   along the half axes, uniform by area
 RELIEF_KERNEL Vec2f light_coordinates(RectangleLight, Vec2f u) { return {2.0f * u.x - 1.0f, 2.0f * u.y - 1.0f}; }
@@ -92,18 +116,24 @@ RELIEF_KERNEL Vec2f light_coordinates(RectangleLight, Vec2f u) { return {2.0f * 
 RELIEF_KERNEL LightSample light_sample(RectangleLight kind, const Light& light, Vec3f P, Vec2f u)
 {
   if (!light_faces(light, P)) return {};
-  const float omega = rectangle_light_solid_angle(light, P, light.area);
-  if (omega > 0.0f) return light_point_sample(light, P, rectangle_light_point(light, P, omega, u), 1.0f / omega);
+  Light storage;
+  const Light* const part = light.spread_tan > 0.0f ? rectangle_light_part(light, P, storage) : &light;
+  if (part == nullptr) return {};
+  const float omega = rectangle_light_solid_angle(*part, P, part->area);
+  if (omega > 0.0f) return light_point_sample(*part, P, rectangle_light_point(*part, P, omega, u), 1.0f / omega);
   const Vec2f q = light_coordinates(kind, u);
-  return light_point_sample(light, P, light.P + light.edge_u * q.x + light.edge_v * q.y);
+  return light_point_sample(*part, P, part->P + part->edge_u * q.x + part->edge_v * q.y);
 }
 
 /// Solid-angle density of light_sample.
 RELIEF_KERNEL float light_pdf(RectangleLight, const Light& light, Vec3f P, Vec3f wi, float distance)
 {
   if (!light_faces(light, P)) return 0.0f;
-  const float omega = rectangle_light_solid_angle(light, P, light.area);
-  return omega > 0.0f ? 1.0f / omega : light_area_pdf(light, wi, distance);
+  Light storage;
+  const Light* const part = light.spread_tan > 0.0f ? rectangle_light_part(light, P, storage) : &light;
+  if (part == nullptr) return 0.0f;
+  const float omega = rectangle_light_solid_angle(*part, P, part->area);
+  return omega > 0.0f ? 1.0f / omega : light_area_pdf(*part, wi, distance);
 }
 
 RELIEF_KERNEL Vec3f light_half_extent(RectangleLight, const Light& light)

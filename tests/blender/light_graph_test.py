@@ -457,3 +457,10 @@ def test_spread_of_areas():
     for shape, spread in (("RECTANGLE", 100), ("DISK", 60)):
         scene = _stage(lambda: _add_area(shape=shape, spread=math.radians(spread)))
         assert_agrees(scene, samples=256)
+
+
+def test_narrow_spreads():
+    """Beams: where they shine is sampled, and Cycles' rounding is met. Of disks Cycles samples all, and tells nothing for noise."""
+    for shape, spread in (("RECTANGLE", 1), ("RECTANGLE", 4)):
+        scene = _stage(lambda: _add_area(shape=shape, spread=math.radians(spread)))
+        assert_agrees(scene, samples=256)

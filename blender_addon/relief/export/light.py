@@ -14,6 +14,8 @@ import math
 from dataclasses import dataclass
 from typing import Callable
 
+import numpy as np
+
 from .. import compat
 from .light_graph import multiplied, read_emission
 
@@ -143,6 +145,7 @@ def _add_area(place, light, color, energy, own):
         if light.spread < _NARROWEST_SPREAD and compat.SPREADS_TO_NOTHING:
             place.warn("a spread of less than a degree", "it spreads by a degree")
         value["spread"] = max(light.spread, _NARROWEST_SPREAD)
+        value["radiance"] *= _spread_gain(value["spread"])
     if round_shape:
         # A disk of diameter 1, stretched by a node: ellipses have no shape of their own in the format.
         value.update(shape="disk", radius=0.5)
@@ -150,6 +153,21 @@ def _add_area(place, light, color, energy, own):
     else:
         value.update(shape="rectangle", width=width, height=height)
         place.writer.extend(place.node, "RELIEF_area_light", value)
+
+
+def _spread_gain(spread):
+    """What rounding makes of a narrow light in Cycles before 4.0, which takes the difference of nearly equal numbers in single
+    precision: 1.25 at a degree, 1.007 at three.
+
+    @param  spread  radians, below π
+    """
+    if compat.SPREADS_TO_NOTHING:
+        return 1.0
+    one, pi = np.float32, np.float32(math.pi)
+    angle = one(0.5) * (pi - one(spread))
+    rounded = one(2) / (one(2) + (one(2) * angle - pi) * np.tan(angle))
+    tangent = math.tan(spread / 2)
+    return float(rounded) * (tangent - spread / 2) / tangent
 
 
 def set_emission(material, radiance, writer):

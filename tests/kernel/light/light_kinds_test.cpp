@@ -522,6 +522,58 @@ TEST(DiskLight, SpreadKeepsThePower)
   }
 }
 
+/// However narrow a spread is, what shines to a point is sampled, and nothing else: a lamp of one degree was fireflies.
+TEST(PlateLights, AreSampledWhereTheirSpreadShines)
+{
+  for (const LightKind kind : {LightKind::kRectangle, LightKind::kDisk}) {
+    for (const double half : {0.01, 0.1, 0.7, 1.4}) {
+      // Skewed and not.
+      for (const float skew : {0.0f, 0.3f}) {
+        Light light = flat_light(kind, {0, 0, 0}, {0.7f, 0, 0}, {skew, 0.5f, 0});
+        light.emission = {1, 1, 1};
+        light.spread_tan = static_cast<float>(std::tan(half));
+        light.spread_scale = 1.0f / (light.spread_tan - static_cast<float>(half));
+        const float side = light.axis.z > 0 ? 1.0f : -1.0f;
+        // In the middle of the beam, at its rim, and out of it.
+        for (const Vec3f P : {Vec3f{0.1f, 0.05f, side}, Vec3f{0.698f, 0.02f, side}, Vec3f{0.2f, 9, side}}) {
+          // By the midpoint rule over the angles about the axis, which all points of the plane have to P.
+          constexpr int kSteps = 2000;
+          double expected = 0;
+          for (int i = 0; i < kSteps; ++i) {
+            const double tangent = std::tan(half) * (i + 0.5) / kSteps, cosine = 1 / std::sqrt(1 + tangent * tangent);
+            int seen = 0;
+            for (int k = 0; k < 360; ++k) {
+              const double phi = (k + 0.5) * M_PI / 180;
+              const double x = double(P.x) + tangent * std::cos(phi), y = double(P.y) + tangent * std::sin(phi);
+              const double v = y / 0.5, u = (x - double(skew) * v) / 0.7;
+              const bool is_on = kind == LightKind::kDisk ? u * u + v * v <= 1 : std::abs(u) <= 1 && std::abs(v) <= 1;
+              seen += is_on ? 1 : 0;
+            }
+            // cos θ / d² cos θ of an element of area.
+            expected += (std::tan(half) - tangent) / (std::tan(half) - half) * std::pow(cosine, 4) * seen / 360 * 2 *
+                        M_PI * tangent * std::tan(half) / kSteps;
+          }
+          constexpr std::uint32_t kSamples = 1 << 14;
+          double sum = 0, squares = 0;
+          for (std::uint32_t i = 0; i < kSamples; ++i) {
+            const LightSample sample = light_sample(light, P, sample_2d(3, i, 0));
+            if (!(sample.pdf > 0)) continue;
+            ASSERT_NEAR(light_pdf(light, P, sample.wi, sample.distance), sample.pdf, 1e-3f * sample.pdf);
+            const double f = double(sample.radiance.x) * std::abs(double(sample.wi.z)) / double(sample.pdf);
+            sum += f;
+            squares += f * f;
+          }
+          EXPECT_NEAR(sum / kSamples, expected, 0.01 * expected + 1e-9)
+              << half << " " << skew << " " << P.x << " " << P.y;
+          if (expected > 0 && half < 1) {
+            EXPECT_LT(squares * kSamples, 4.5 * sum * sum) << half << " " << skew << " " << P.x;
+          }
+        }
+      }
+    }
+  }
+}
+
 TEST(SunLight, IrradianceIsTheSameEverywhere)
 {
   Light light;
