@@ -84,7 +84,8 @@ RELIEF_KERNEL void closure_add(MixtureBuild& b,
   if (diffuse_weight > kLeastClosureWeight) {
     const Vec3f diffuse = max(below, Vec3f{}) * (weight * diffuse_weight);
     const bool enters = scatters_below && subsurface_enters(b, spec);
-    MixtureLobe* lobe = mixture_add(b, diffuse, frame_from_normal(N));
+    const bool is_low = !(dot(N, b.wo) > kLeastDiffuseCosine);
+    MixtureLobe* lobe = mixture_add(b, diffuse, frame_from_normal(N), is_low);
     if (lobe != nullptr) {
       lobe->kind = MixtureLobeKind::kPrincipledDiffuse;
       lobe->shape.principled_diffuse = {in.roughness};

@@ -65,18 +65,35 @@ RELIEF_KERNEL void principled3_coat_add(LobeColumns& columns, const MixtureBuild
   lobe_column_favour(*lobe, mean_component(fresnel_interpolated(F0, cos_o, eta)));
 }
 
+/// The frames of the diffuse lobes: those of the others, but where wo is below the horizon.
+RELIEF_KERNEL int principled3_diffuse_frame(LobeColumns& columns,
+                                            const MixtureBuildLanes& b,
+                                            const Vec3x8& N,
+                                            int frame)
+{
+  const F8 cos_o = load8(columns.frames[frame].wo[2]);
+  // Lanes of no hit have no wo.
+  const I8 is_low = ~(cos_o > kLeastDiffuseCosine) & (dot(b.wo, b.wo) > 0.0f);
+  if (mask_of(is_low) == 0 || columns.num_frames == kMostLobeColumns) [[likely]]
+    return frame;
+  const int low = lobe_frames_add(columns, b, N, true);
+  store8(columns.frames[low].wo, select(is_low, load8(columns.frames[low].wo), load8(columns.frames[frame].wo)));
+  return low;
+}
+
 /// Resolves the closure.
 [[gnu::noinline]] RELIEF_KERNEL void principled3_columns_make(const MixtureBuildLanes& b,
                                                               const Principled3Lanes& in,
                                                               LobeColumns& columns)
 {
-  const int frame = lobe_frames_add(columns, b, closure_normal(b, in.normal));
+  const Vec3x8 N = closure_normal(b, in.normal);
+  const int frame = lobe_frames_add(columns, b, N);
   const I8 is_there = (in.weight > kLeastClosureWeight) & (in.weight < kInfinity);
   const F8 base_weight = 1.0f - saturated(in.metallic);
   const I8 has_base = is_there & (base_weight > kLeastClosureWeight);
   const Vec3x8 diffuse = not_negative(in.base_color) * (in.weight * base_weight);
-  if (LobeColumn* const lobe =
-          lobe_column_add(columns, {.kind = MixtureLobeKind::kPrincipledDiffuse}, frame, diffuse, has_base)) {
+  if (LobeColumn* const lobe = lobe_column_add(columns, {.kind = MixtureLobeKind::kPrincipledDiffuse},
+                                               principled3_diffuse_frame(columns, b, N, frame), diffuse, has_base)) {
     store8(lobe->shape[0], in.roughness);
   }
   if (in.has_sheen) {

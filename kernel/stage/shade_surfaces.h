@@ -41,7 +41,7 @@ RELIEF_KERNEL MixtureBuildLanes surface_group_build(const KernelGlobals& g,
     const SurfaceInteraction& at = group.at[k];
     store_lane(numbers, k, -path_direction(state, group.paths[k]));
     store_lane(numbers + 3, k, at.side.Ng);
-    store_lane(numbers + 6, k, shading_normal_turned(at.hit.Ns, at.side.Ng));
+    store_lane(numbers + 6, k, at.side.front ? at.hit.Ns : -at.hit.Ns);
     is_front[k] = at.side.front ? -1 : 0;
   });
   return {load8(numbers), load8(numbers + 3), load8(numbers + 6),

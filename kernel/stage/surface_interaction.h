@@ -349,7 +349,7 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
   MixtureBuild build;
   build.wo = wo;
   build.Ng = side.Ng;
-  build.Ns = shading_normal_turned(at.hit.Ns, side.Ng);
+  build.Ns = side.front ? at.hit.Ns : -at.hit.Ns;
   build.front = side.front;
   build.tables = g.bsdf_tables;
   build.lobes = lobes_begin(lobes);
@@ -373,7 +373,7 @@ RELIEF_KERNEL void surface_interaction_mix(const KernelGlobals& g,
     build.Ns = is_free ? closure_normal_as_given(build, given) : closure_normal(build, given);
   }
   side.Ns = shading_normal_towards(build.Ns, wo);
-  side.bent = !(dot(side.Ns, shading_normal_turned(at.hit.Ns, side.Ng)) > kUnbent);
+  side.bent = !(dot(side.Ns, side.front ? at.hit.Ns : -at.hit.Ns) > kUnbent);
   side.frame = lobes_side(lobes, side.Ns);
   if (build.lobes != nullptr || lane.program->num_closures > 1) {
     const bool has_all = build.lobes == nullptr || (build.reflects && build.refracts && is_zero(build.tangent));
@@ -554,11 +554,18 @@ RELIEF_KERNEL Vec3f surface_ray_origin(const SurfaceInteraction& at, Vec3f wi)
   return surface_hit_origin(at.hit, at.hit.P, above == at.side.front);
 }
 
+/// Whether the mesh's normal looks to the other side of its triangle: such are given to leaves, that they be shaded as the crown is.
+RELIEF_KERNEL bool surface_normal_looks_through(const SurfaceInteraction& at)
+{
+  return (dot(at.hit.Ns, at.side.Ng) > 0.0f) != at.side.front;
+}
+
 /// Origin of a ray that asks for a light: it leaves the smooth surface, on the side that its normal tells.
 /// @param wi  as above
 RELIEF_KERNEL Vec3f surface_light_origin(const SurfaceInteraction& at, Vec3f wi)
 {
-  if (__builtin_expect((at.instance->flags & kCurves) != 0, 0)) return surface_ray_origin(at, wi);
+  const bool is_curve = (at.instance->flags & kCurves) != 0;
+  if (__builtin_expect(is_curve || surface_normal_looks_through(at), 0)) return surface_ray_origin(at, wi);
   const bool above = dot(wi, at.side.Ns) > 0.0f;
   const float side = above ? 1.0f : -1.0f;
   const Vec3f P = at.hit.P + terminator_lift(at.hit.lift, wi, side * at.side.Ng, side * at.side.Ns);

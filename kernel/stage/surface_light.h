@@ -40,7 +40,10 @@ RELIEF_KERNEL void shade_surface_lit(const KernelGlobals& g,
   // Cycles asks no even surroundings: paths alone find them, which go nowhere below the true surface.
   const bool is_even_sky = emitter == nullptr && !g.lights.environment.has_map;
   const bool is_curve = (at.instance->flags & kCurves) != 0;
-  if (is_even_sky && !is_curve && (dot(light.wi, at.side.Ng) > 0.0f) != (wi.z > 0.0f)) return;
+  if (is_even_sky && !is_curve) {
+    const bool is_above = dot(light.wi, at.side.Ng) > 0.0f;
+    if (is_above != (wi.z > 0.0f) || (!is_above && !at.transmits)) return;
+  }
   const auto transmits = [&] { return (wi.z < 0.0f) != (dot(at.side.frame.n, path_direction(state, path)) > 0.0f); };
   if constexpr ((kFeatures & kFeatureMixture) == 0) {
     const std::uint32_t without = path_does_without(g, state.flags[path]);

@@ -128,6 +128,35 @@ def test_normal_maps_over_coordinates_without_area():
     assert_agrees(scene, samples=64, block=4)
 
 
+def test_normals_that_look_through_their_faces():
+    """Leaves of trees are given the normals of a crown, half of which look to the other side: they are lit from there.
+
+    By surroundings: of lamps near such a normal's horizon relief and Cycles see different ones.
+    """
+    scene = _scene(1)
+    _clear()
+    leaves = new_material("leaf", "ShaderNodeBsdfPrincipled", Roughness=0.6)[0]
+    numbers = np.random.default_rng(5)
+    points, normals = [], []
+    for x in range(5):
+        for y in range(4):
+            u, v, normal = (vector / np.linalg.norm(vector) for vector in numbers.normal(size=(3, 3)))
+            middle = np.array((x - 2, y - 1.5, 0))
+            points += [middle + 0.4 * (a * u + b * v) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+            normals += [normal] * 4
+    mesh = bpy.data.meshes.new("leaves")
+    mesh.from_pydata([tuple(point) for point in points], [], [tuple(range(i, i + 4)) for i in range(0, len(points), 4)])
+    mesh.polygons.foreach_set("use_smooth", [True] * len(mesh.polygons))
+    if bpy.app.version < (4, 1, 0):
+        mesh.use_auto_smooth = True
+    mesh.normals_split_custom_set([tuple(normal) for normal in normals])
+    mesh.materials.append(leaves)
+    bpy.context.collection.objects.link(bpy.data.objects.new("leaves", mesh))
+    set_world((0.2, 0.3, 0.5))
+    add_camera((0, 0, 9), lens=60)
+    assert_agrees(scene, samples=64, block=4)
+
+
 def test_mirrors_of_bent_normals_in_a_furnace():
     """Coarse and fine balls, smooth and flat: what is reflected above the true surface is not lost."""
     for segments in (24, 96):
