@@ -259,7 +259,7 @@ def _hidden_stage(kind, ray, **settings):
     return scene
 
 
-def test_lamps_that_some_rays_do_not_see():
+def test_lamps_that_some_rays_do_not_see_long():
     """What is behind glass, or mirrored, or lit diffusely may be without a lamp that lights everything else."""
     # Of 96 samples a lamp that is not hidden from the first two fails by a chance of 1e-7 at most. Of what is transmitted there is less.
     for ray, area, sun in (("diffuse", 96, 384), ("glossy", 96, 96), ("transmission", 512, 512)):

@@ -82,7 +82,7 @@ _MATERIALS = {
 }
 
 
-def test_filter_glossy_blurs_as_cycles_does():
+def test_filter_glossy_blurs_as_cycles_does_long():
     """Block means agree within noise for several strengths; without the blur they would not, in mirrors by 2 to 20 %."""
     worst = {}
     for name, material in _MATERIALS.items():
