@@ -21,7 +21,6 @@ RELIEF_KERNEL F8 saturated(F8 x) { return clamp(x, 0.0f, 1.0f); }
 RELIEF_KERNEL Vec3x8 saturated(const Vec3x8& c) { return {saturated(c.x), saturated(c.y), saturated(c.z)}; }
 RELIEF_KERNEL F8 not_negative(F8 x) { return max(x, splat8(0.0f)); }
 RELIEF_KERNEL Vec3x8 not_negative(const Vec3x8& c) { return {not_negative(c.x), not_negative(c.y), not_negative(c.z)}; }
-RELIEF_KERNEL Vec3x8 multiplied(const Vec3x8& a, const Vec3x8& b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
 RELIEF_KERNEL F8 mean_component(const Vec3x8& c) { return (c.x + c.y + c.z) * (1.0f / 3.0f); }
 RELIEF_KERNEL F8 max_component(const Vec3x8& c) { return max(c.x, max(c.y, c.z)); }
 RELIEF_KERNEL F8 safe_sqrt(F8 x) { return sqrt(x > 0.0f ? x : splat8(0.0f)); }

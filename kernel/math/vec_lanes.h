@@ -18,6 +18,8 @@ RELIEF_KERNEL Vec3x8 operator-(const Vec3x8& a) { return {-a.x, -a.y, -a.z}; }
 RELIEF_KERNEL Vec3x8 operator*(const Vec3x8& a, F8 s) { return {a.x * s, a.y * s, a.z * s}; }
 RELIEF_KERNEL Vec3x8 operator*(F8 s, const Vec3x8& a) { return a * s; }
 RELIEF_KERNEL Vec3x8 operator/(const Vec3x8& a, F8 s) { return a * (1.0f / s); }
+/// Coordinate by coordinate.
+RELIEF_KERNEL Vec3x8 multiplied(const Vec3x8& a, const Vec3x8& b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
 RELIEF_KERNEL F8 dot(const Vec3x8& a, const Vec3x8& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 RELIEF_KERNEL F8 length(const Vec3x8& a) { return sqrt(dot(a, a)); }
 RELIEF_KERNEL Vec3x8 normalize(const Vec3x8& a) { return a * (1.0f / length(a)); }

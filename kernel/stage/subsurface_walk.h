@@ -117,12 +117,10 @@ struct WalkMedium {
   Vec3x8 sigma_s, sigma_t;
 };
 
-RELIEF_KERNEL Vec3x8 mul(const Vec3x8& a, const Vec3x8& b) { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
-
 RELIEF_KERNEL WalkMedium walk_medium(const SubsurfaceWalks& w)
 {
   const I8 is_even = w.step >= kAnisotropicWalkSteps;
-  const Vec3x8 sigma_s = mul(w.sigma_t, w.albedo), even = sigma_s * (1.0f - w.g);
+  const Vec3x8 sigma_s = multiplied(w.sigma_t, w.albedo), even = sigma_s * (1.0f - w.g);
   return {is_even ? splat8(0.0f) : w.g, select(is_even, even, sigma_s),
           select(is_even, w.sigma_t - sigma_s + even, w.sigma_t)};
 }
@@ -169,7 +167,7 @@ RELIEF_KERNEL void subsurface_walks_choose(SubsurfaceWalks& w)
 {
   const F8 zero = splat8(0.0f);
   const WalkMedium medium = walk_medium(w);
-  const Vec3x8 weights = abs(mul(w.throughput, w.albedo));
+  const Vec3x8 weights = abs(multiplied(w.throughput, w.albedo));
   const F8 sum = weights.x + weights.y + weights.z;
   w.chances = select(sum > 0.0f, weights / sum, splat8(splat3(1.0f / 3.0f)));
   const F8 u_channel = walk_number(w, kWalkChannel);
