@@ -10,10 +10,11 @@ from scenes import add_camera, add_plane, add_sphere, folder, new_material, new_
 
 
 def _clumsy_scene(number=30):
-    """Balls whose materials have a pattern that relief does not know, one with two mistakes, and one too wide camera."""
+    """Balls whose materials have a pattern that relief does not know, one with two mistakes, and a pass that nobody fills."""
     scene = new_scene(16, 12)
     scene.relief.strict = False
-    add_camera().data.type = "PANO"
+    add_camera()
+    scene.view_layers[0].use_pass_vector = True
     for index in range(number):
         material, tree, node = new_material(f"pattern {index}")
         odd = tree.nodes.new("ShaderNodeShaderToRGB")
@@ -47,7 +48,8 @@ def test_warnings_are_grouped_by_cause():
     assert "Shader to RGB" in groups[0].label and "odd 7" not in groups[0].label, groups[0].label
     text = groups[0].text()
     assert all(f'material "pattern {i}": ' in text and f'"odd {i}"' in text for i in range(30)), text
-    assert "panoramic" in groups[1].label and groups[1].text().splitlines()[1].strip() == 'camera "camera"'
+    assert "Vector" in groups[1].label, groups[1].label
+    assert groups[1].text().splitlines()[1].strip() == f'view layer "{bpy.context.view_layer.name}"', groups[1].text()
 
 
 def test_the_tooltip_has_the_whole_text():
