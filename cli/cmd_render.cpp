@@ -249,7 +249,7 @@ std::string report_html(const FramePaths& paths,
 std::string emptiness_warning(const Scene& scene, const FilmView& film)
 {
   const bool has_something = std::any_of(scene.instances.begin(), scene.instances.end(), [](const Instance& instance) {
-    return (instance.flags & (kVisibleToCamera | kHoldout)) == kVisibleToCamera;
+    return (instance.flags & (kVisibleToCamera | kHoldout | kShadowCatcher)) == kVisibleToCamera;
   });
   const bool is_window = film.width != film.full_width || film.height != film.full_height;
   if (!has_something || is_window) return {};

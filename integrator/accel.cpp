@@ -24,8 +24,10 @@ bool is_identity(const Affine3& m)
 std::uint32_t mask_of(std::uint32_t instance_flags)
 {
   const std::uint32_t hidden = (instance_flags & kHiddenFrom) >> kHiddenFromShift << kRayBounceShift;
-  return (kRayBounce & ~hidden) | ((instance_flags & kVisibleToCamera) != 0 ? std::uint32_t{kRayCamera} : 0u) |
-         ((instance_flags & kCastsShadow) != 0 ? std::uint32_t{kRayShadow} : 0u);
+  const std::uint32_t mask = (kRayBounce & ~hidden) |
+                             ((instance_flags & kVisibleToCamera) != 0 ? std::uint32_t{kRayCamera} : 0u) |
+                             ((instance_flags & kCastsShadow) != 0 ? std::uint32_t{kRayShadow} : 0u);
+  return (instance_flags & kShadowCatcher) != 0 ? mask | mask << kRayCatchersShift : mask;
 }
 
 /// How a ray stands to the box of what it may hit.
@@ -455,7 +457,8 @@ void Accel::build_top(const Scene& scene, std::span<const Light> lights, std::sp
     const Light& light = lights[area_lights[i]];
     RTCGeometry geometry = light_is_quad(light) && light.motion_index < 0 ? new_rectangle(light) : new_light(light);
     const auto id = static_cast<unsigned>(scene.instances.size() + i);
-    const std::uint32_t mask = kRayBounce | (light.visible_to_camera ? std::uint32_t{kRayCamera} : 0u);
+    const std::uint32_t seen = kRayBounce | (light.visible_to_camera ? std::uint32_t{kRayCamera} : 0u);
+    const std::uint32_t mask = seen | seen << kRayCatchersShift;
     const Box3 with_light = box_union(scene_->target, light_box(light));
     if (with_light.low != scene_->target.low || with_light.high != scene_->target.high) {
       if (scene_->far_lights == nullptr) scene_->far_lights = trees_->scene_make();

@@ -26,7 +26,8 @@ enum RayMask : std::uint32_t {
   kRayCamera = 1u << 0,
   kRayShadow = 1u << 1,
   kRayBounceShift = 2,
-  kRayBounce = 0xfu << kRayBounceShift
+  kRayBounce = 0xfu << kRayBounceShift,
+  kRayCatchersShift = 8  ///< position of the same bits of rays that meet shadow catchers and lights only
 };
 
 /// Number of the object that a ray has met; RTC_INVALID_GEOMETRY_ID: none.

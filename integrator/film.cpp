@@ -17,7 +17,11 @@ namespace relief {
 
 namespace {
 
-AccumulatorLayout layout_make(AovMask aov_mask, int cryptomatte_levels, bool keeps_clear, bool counts_samples)
+AccumulatorLayout layout_make(AovMask aov_mask,
+                              int cryptomatte_levels,
+                              bool keeps_clear,
+                              bool counts_samples,
+                              bool keeps_catchers)
 {
   AccumulatorLayout layout;
   layout.cryptomatte_levels = cryptomatte_levels;
@@ -54,6 +58,11 @@ AccumulatorLayout layout_make(AovMask aov_mask, int cryptomatte_levels, bool kee
   layout.light_by_event =
       std::ranges::any_of(layout.light_passes, is_kept) || std::ranges::any_of(layout.event_colors, is_kept);
   if (keeps_clear) layout.clear = layout.num_floats++;
+  if (keeps_catchers) {
+    layout.catcher = layout.num_floats;
+    layout.num_floats += CatcherSums::kNumFloats;
+  }
+  layout.shadow_catcher = aov_is_in(Aov::kShadowCatcher, aov_mask);
   if (counts_samples) {
     layout.samples = layout.num_floats;
     layout.num_floats += 2;
@@ -87,6 +96,35 @@ void put_cryptomatte(const float* sums, int levels, float inverse_n, float* to)
 }
 
 Vec3f load3(const float* p) { return {p[0], p[1], p[2]}; }
+
+/// What is left of light on catchers. Where a channel has none to begin with it is as the others are, and where all have none
+/// nothing is taken.
+/// @param sums  of CatcherSums::kAll or kEven
+Vec3f light_left(const float* sums)
+{
+  float left[3];
+  float sum = 0, count = 0;
+  for (int c = 0; c < 3; ++c) {
+    left[c] = sums[CatcherSums::kCaught + c] / sums[CatcherSums::kAlone + c];
+    if (!std::isfinite(left[c])) continue;
+    sum += left[c];
+    count += 1;
+  }
+  const float others = count > 0 ? sum / count : 1.0f;
+  for (float& c : left) c = std::isfinite(c) ? c : others;
+  return load3(left);
+}
+
+/// The part of light on catchers that is not in shadow: what a picture's alpha and what is behind can show, as in Cycles.
+/// @param sums  as for light_left
+float unshadowed(const float* sums)
+{
+  const Vec3f left = light_left(sums);
+  return std::clamp((left.x + left.y + left.z) / 3.0f, 0.0f, 1.0f);
+}
+
+/// Where catchers are as good as dark, their noise says nothing of that of the picture.
+constexpr float kMostVarianceScale = 1e4f;
 
 /// What a pixel's sums say: means, the differences that error_extrapolate wants (D₁, D₂), and the variance of the mean
 /// as if the samples were independent.
@@ -179,13 +217,19 @@ static std::size_t sums_size(int width, int height, const AccumulatorLayout& lay
   return size;
 }
 
-Film::Film(int width, int height, AovMask aov_mask, int cryptomatte_levels, bool keeps_clear, bool counts_samples)
+Film::Film(int width,
+           int height,
+           AovMask aov_mask,
+           int cryptomatte_levels,
+           bool keeps_clear,
+           bool counts_samples,
+           bool keeps_catchers)
     : width_(width),
       height_(height),
       tiles_x_((width + kTileSize - 1) / kTileSize),
       tiles_y_((height + kTileSize - 1) / kTileSize),
       aov_mask_(aov_mask | aov_bit(Aov::kBeauty)),
-      layout_(layout_make(aov_mask_, cryptomatte_levels, keeps_clear, counts_samples)),
+      layout_(layout_make(aov_mask_, cryptomatte_levels, keeps_clear, counts_samples, keeps_catchers)),
       sums_(sums_size(width, height, layout_)),
       samples_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_))
 {
@@ -471,16 +515,19 @@ void Film::resolve_pixel(const float* in,
     p[1] = v.y;
     p[2] = v.z;
   };
-  const float inverse_n = 1.0f / static_cast<float>(samples);
+  const auto count = static_cast<float>(samples);
+  const float inverse_n = 1.0f / count;
   const float light = exposure * inverse_n;
   const float hits = in[AccumulatorLayout::kCoverage];
   const float inverse_hits = hits > 0.0f ? 1.0f / hits : 0.0f;
   if (float* p = plane(Aov::kBeauty)) {
-    put3(p, pixel.mean * exposure);
+    put3(p, shown(in, pixel.mean, count, CatcherSums::kAll) * exposure);
     p[3] = alpha(in, samples);
   }
   if (float* p = plane(Aov::kDirect)) put3(p, load3(in + layout_.direct) * light);
-  if (float* p = plane(Aov::kIndirect)) put3(p, pixel.mean * exposure - load3(in + layout_.direct) * light);
+  if (float* p = plane(Aov::kIndirect)) {
+    put3(p, without_catchers(in, pixel.mean, count, CatcherSums::kAll) * exposure - load3(in + layout_.direct) * light);
+  }
   if (float* p = plane(Aov::kAlbedo)) put3(p, load3(in + layout_.albedo) * inverse_n);
   if (float* p = plane(Aov::kNormal)) put3(p, load3(in + layout_.normal) * inverse_n);
   if (float* p = plane(Aov::kDepth)) p[0] = hits > 0.0f ? in[layout_.depth] * inverse_hits : kInfinity;
@@ -495,12 +542,17 @@ void Film::resolve_pixel(const float* in,
   if (float* p = plane(Aov::kVariance)) {
     const Vec3f spread = pixel.sample_variance;
     const auto level = [&](std::size_t channel, float v) { return levels.channels[channel][spread_class(v)]; };
-    put3(p, spread * Vec3f{level(0, spread.x), level(1, spread.y), level(2, spread.z)} * sqr(exposure));
+    const Vec3f variance = spread * Vec3f{level(0, spread.x), level(1, spread.y), level(2, spread.z)} * sqr(exposure);
+    put3(p, variance * variance_shown(in, samples));
   }
-  if (float* p = plane(Aov::kHalf)) put3(p, pixel.even * exposure);
+  if (float* p = plane(Aov::kHalf)) {
+    const auto half = static_cast<float>((samples + 1) / 2);
+    put3(p, shown(in, pixel.even, half, CatcherSums::kEven) * exposure);
+  }
   if (float* p = plane(Aov::kDisplacementSteps)) p[0] = in[layout_.displacement_steps] * inverse_n;
   if (float* p = plane(Aov::kCaustic)) put3(p, load3(in + layout_.caustic) * light);
   if (float* p = plane(Aov::kHoldout)) p[0] = in[layout_.holdout] * inverse_n;
+  if (float* p = plane(Aov::kShadowCatcher)) put3(p, shadow_catcher(in, samples));
   if (float* p = plane(Aov::kMist)) p[0] = 1.0f - in[layout_.mist] * inverse_n;
   if (float* p = plane(Aov::kEmission)) put3(p, load3(in + layout_.emission) * light);
   if (float* p = plane(Aov::kEnvironment)) put3(p, load3(in + layout_.environment) * light);
@@ -526,10 +578,57 @@ void Film::resolve_pixel(const float* in,
   }
 }
 
-float Film::alpha(const float* record, std::uint32_t samples) const
+float Film::coverage(const float* record, std::uint32_t samples) const
 {
   const float clear = layout_.clear >= 0 ? record[layout_.clear] : 0.0f;
   return std::clamp((record[AccumulatorLayout::kCoverage] - clear) / static_cast<float>(samples), 0.0f, 1.0f);
+}
+
+float Film::alpha(const float* record, std::uint32_t samples) const
+{
+  const float covered = coverage(record, samples);
+  if (layout_.catcher < 0 || layout_.shadow_catcher) return covered;
+  const float* sums = record + layout_.catcher;
+  const float shadow = 1.0f - unshadowed(sums + CatcherSums::kAll);
+  return std::min(covered + sums[CatcherSums::kShare] * shadow / static_cast<float>(samples), 1.0f);
+}
+
+Vec3f Film::without_catchers(const float* record, Vec3f mean, float count, int part) const
+{
+  if (layout_.catcher < 0 || record[layout_.catcher + CatcherSums::kShare] == 0.0f) return mean;
+  // Where catchers are all that is seen the two sums are of the same numbers in the same order: nothing is left.
+  return max(mean - load3(record + layout_.catcher + part + CatcherSums::kCaught) / count, Vec3f{});
+}
+
+Vec3f Film::shown(const float* record, Vec3f mean, float count, int part) const
+{
+  const Vec3f light = without_catchers(record, mean, count, part);
+  if (layout_.catcher < 0 || layout_.shadow_catcher) return light;
+  const float* sums = record + layout_.catcher + part;
+  return light + load3(sums + CatcherSums::kBackdrop) * (unshadowed(sums) / count);
+}
+
+Vec3f Film::shadow_catcher(const float* record, std::uint32_t samples) const
+{
+  if (layout_.catcher < 0) return splat3(1.0f);
+  const float* sums = record + layout_.catcher;
+  const float share = sums[CatcherSums::kShare] / static_cast<float>(samples);
+  if (!(share > 0.0f)) return splat3(1.0f);
+  const float nothing = std::max(1.0f - coverage(record, samples) - share, 0.0f);
+  return (share * light_left(sums + CatcherSums::kAll) + splat3(nothing)) / (share + nothing);
+}
+
+Vec3f Film::variance_shown(const float* record, std::uint32_t samples) const
+{
+  if (layout_.catcher < 0) return splat3(1.0f);
+  const float* sums = record + layout_.catcher;
+  const float share = std::min(sums[CatcherSums::kShare] / static_cast<float>(samples), 1.0f);
+  const Vec3f alone = load3(sums + CatcherSums::kAll + CatcherSums::kAlone);
+  const Vec3f backdrop = layout_.shadow_catcher ? Vec3f{} : load3(sums + CatcherSums::kAll + CatcherSums::kBackdrop);
+  const auto scale = [&](float behind, float light) {
+    return 1.0f - share + (light > 0.0f ? share * std::min(sqr(behind / light), kMostVarianceScale) : 0.0f);
+  };
+  return {scale(backdrop.x, alone.x), scale(backdrop.y, alone.y), scale(backdrop.z, alone.z)};
 }
 
 FilmView Film::window(AovMask aov_mask, int crop_x, int crop_y, int full_width, int full_height) const
@@ -558,7 +657,10 @@ RenderedImage Film::beauty(int crop_x, int crop_y, int full_width, int full_heig
       const std::uint32_t samples = pixel_samples(sums, tile_at(x, y));
       if (samples == 0) continue;
       const float inverse_n = 1.0f / static_cast<float>(samples);
-      for (int i = 0; i < 3; ++i) to[i] = sums[AccumulatorLayout::kBeauty + i] * (exposure * inverse_n);
+      const Vec3f sum = shown(sums, load3(sums + AccumulatorLayout::kBeauty), 1.0f, CatcherSums::kAll);
+      to[0] = sum.x * (exposure * inverse_n);
+      to[1] = sum.y * (exposure * inverse_n);
+      to[2] = sum.z * (exposure * inverse_n);
       to[3] = alpha(sums, samples);
     }
   });

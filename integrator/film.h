@@ -70,12 +70,14 @@ class Film {
   /// @param cryptomatte_levels  ids that a Cryptomatte keeps of a pixel
   /// @param keeps_clear         alpha is not coverage by surfaces alone, see film_add_clear
   /// @param counts_samples      each pixel has a number of its own, see judge
+  /// @param keeps_catchers      there are shadow catchers; if so, keeps_clear
   Film(int width,
        int height,
        AovMask aov_mask,
        int cryptomatte_levels = 6,
        bool keeps_clear = false,
-       bool counts_samples = false);
+       bool counts_samples = false,
+       bool keeps_catchers = false);
 
   FilmAccumulatorView accumulator();
   int width() const { return width_; }
@@ -131,7 +133,20 @@ class Film {
 
  private:
   const float* record(int x, int y) const;
+  /// Coverage by all but catchers.
+  float coverage(const float* record, std::uint32_t samples) const;
   float alpha(const float* record, std::uint32_t samples) const;
+  /// A pixel's light without that of catchers.
+  /// @param mean   of count samples, theirs included
+  /// @param part   CatcherSums::kAll; of even-numbered samples kEven
+  Vec3f without_catchers(const float* record, Vec3f mean, float count, int part) const;
+  /// What the picture shows: in place of catchers the shadow on what is behind. Arguments as for without_catchers.
+  Vec3f shown(const float* record, Vec3f mean, float count, int part) const;
+  /// Factors on the variance of a pixel's light that make that of what is shown: that of its catchers by as much as what is behind
+  /// is brighter than they. As it moves with the light that they have alone, shadow has less.
+  Vec3f variance_shown(const float* record, std::uint32_t samples) const;
+  /// The layer of what is left of light on catchers.
+  Vec3f shadow_catcher(const float* record, std::uint32_t samples) const;
   /// View of a finished picture, without its pixels.
   FilmView window(AovMask aov_mask, int crop_x, int crop_y, int full_width, int full_height) const;
   /// Samples of a pixel of a tile.

@@ -9,11 +9,17 @@ namespace relief {
 
 namespace {
 
-std::uint32_t mask_of(const PathState& state, std::uint32_t path)
+std::uint32_t kind_of(const PathState& state, std::uint32_t path)
 {
   if (state.bounces[path] == 0) return kRayCamera;
   const std::uint32_t flags = state.flags[path];
   return (flags & kPathPhoton) != 0 ? kRayBounce : path_ray_kind(flags) << kRayBounceShift;
+}
+
+std::uint32_t mask_of(const KernelGlobals& g, const PathState& state, std::uint32_t path)
+{
+  const std::uint32_t kind = kind_of(state, path);
+  return g.catchers_alone ? kind << kRayCatchersShift : kind;
 }
 
 void intersect_packet(const KernelGlobals& g,
@@ -114,7 +120,7 @@ void intersect_closest(const KernelGlobals& g,
     ray.ray.tnear = state.t_min[path];
     ray.ray.tfar = state.t_max[path];
     ray.ray.time = path_time(state, path);
-    ray.ray.mask = mask_of(state, path);
+    ray.ray.mask = mask_of(g, state, path);
     ray.ray.id = 0;
     ray.ray.flags = 0;
     ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;

@@ -168,7 +168,9 @@ class RenderRun {
   SamplingEnd end_;
   PhotonChoice choice_;
   std::optional<PhotonPass> photons_;
-  const WavefrontColumns columns_ = context_.columns(choice_.photons, globals_.film.layout.light_by_event);
+  const WavefrontColumns columns_ =
+      context_.columns(choice_.photons, globals_.film.layout.light_by_event, context_.has_catchers);
+  const CatchersAlone catchers_{context_.lights_of_footage.data(), &context_.surface_kernels(false)};
   const Media media_{context_};
   Workers workers_;
   const std::uint32_t wanted_ = samples_wanted(options_);
@@ -202,17 +204,19 @@ double seconds_to_sample(const RenderOptions& options)
 /// Whether samples may be covered by something else than a surface.
 bool has_media(const Scene& scene) { return !scene.media.empty() || scene.environment.medium.has_value(); }
 
-Film film_make(const Scene& scene, const RenderOptions& options)
+Film film_make(const Scene& scene, const RenderOptions& options, bool has_catchers)
 {
   const RenderSettings& settings = options.settings;
   const FilmWindow window = render_window(options);
   const bool is_panoramic = options.camera.projection == Projection::kPanoramic;
-  return {window.width,
-          window.height,
-          options.aov_mask,
-          settings.cryptomatte_levels,
-          !scene.environment.visible_to_camera || has_holdouts(scene) || has_media(scene) || is_panoramic,
-          settings.noise_threshold > 0};
+  return {
+      window.width,
+      window.height,
+      options.aov_mask,
+      settings.cryptomatte_levels,
+      !scene.environment.visible_to_camera || has_holdouts(scene) || has_media(scene) || is_panoramic || has_catchers,
+      settings.noise_threshold > 0,
+      has_catchers};
 }
 
 RenderRun::RenderRun(const Scene& scene,
@@ -227,7 +231,7 @@ RenderRun::RenderRun(const Scene& scene,
       kept_(kept),
       stats_(stats),
       context_(kept.get(scene, render_context_options(options))),
-      film_(film_make(scene, options)),
+      film_(film_make(scene, options, context_.has_catchers)),
       ids_(cryptomatte_ids(scene, options.aov_mask)),
       globals_(make_globals()),
       start_(note_built()),
@@ -237,6 +241,7 @@ RenderRun::RenderRun(const Scene& scene,
         Wavefront worker(columns_);
         worker.stop = &end_.reached();
         if (media_.exist()) worker.media = &media_;
+        if (columns_.catchers) worker.catchers = &catchers_;
         return worker;
       }),
       reporter_(options, progress, static_cast<double>(film_.width()) * film_.height(), start_),

@@ -130,6 +130,21 @@ bool shows_photons_in_media(const Scene& scene)
          (scene.environment.medium && scatters(*scene.environment.medium)) || varies(scene.environment.varying_medium);
 }
 
+namespace {
+
+/// Lights, of which those that are not of the footage are hidden from whatever asks for them or meets them.
+std::vector<Light> only_of_footage(std::vector<Light> lights)
+{
+  for (Light& light : lights) {
+    if (light.in_footage) continue;
+    light.visible_to_camera = false;
+    light.hidden_from = static_cast<std::uint8_t>(kHiddenFrom >> kHiddenFromShift);
+  }
+  return lights;
+}
+
+}  // namespace
+
 SceneContext::~SceneContext() = default;
 
 SceneContext::SceneContext(const Scene& loaded,
@@ -180,6 +195,9 @@ SceneContext::SceneContext(const Scene& loaded,
   globals.num_area_lights = static_cast<std::uint32_t>(lights.area_lights.size());
   globals.lights = lights.view();
   globals.has_lights = lights.any();
+  has_catchers = std::any_of(instances.begin(), instances.end(),
+                             [](const InstanceView& instance) { return (instance.flags & kShadowCatcher) != 0; });
+  if (has_catchers) lights_of_footage = only_of_footage(lights.lights);
   // What shines in space is found by paths alone.
   const bool media_shine =
       std::any_of(media.begin(), media.end(), [](const Medium& medium) { return !is_zero(medium.emission); }) ||
@@ -205,7 +223,7 @@ SceneContext::SceneContext(const Scene& loaded,
   }
 }
 
-WavefrontColumns SceneContext::columns(bool photons, bool light_passes) const
+WavefrontColumns SceneContext::columns(bool photons, bool light_passes, bool catchers) const
 {
   const bool goes_below = std::any_of(scene.materials.begin(), scene.materials.end(),
                                       [](const Material& material) { return material.scatters_below; });
@@ -217,7 +235,8 @@ WavefrontColumns SceneContext::columns(bool photons, bool light_passes) const
           !media.empty(),
           goes_below,
           light_passes,
-          has_closures && lights.chooses_among_few()};
+          has_closures && lights.chooses_among_few(),
+          catchers};
 }
 
 void SceneContext::make_views()

@@ -32,7 +32,8 @@ struct SceneContext : SceneViews {
 
   /// @param photons       the render has a photon pass
   /// @param light_passes  it has layers that tell light apart by its first event
-  WavefrontColumns columns(bool photons, bool light_passes) const;
+  /// @param catchers      it tells what shadow catchers have of light when they are alone
+  WavefrontColumns columns(bool photons, bool light_passes, bool catchers = false) const;
   const std::vector<std::uint8_t>& surface_kernels(bool photons) const
   {
     return photons ? surface_kernel : surface_kernel_of_paths;
@@ -51,6 +52,8 @@ struct SceneContext : SceneViews {
   DisplacementSet displacements;
   std::unique_ptr<Accel> accel;
   ComputedEnvironment backdrop;              ///< if the scene has such a one
+  std::vector<Light> lights_of_footage;  ///< as lights.lights where shadow catchers are alone; empty: nothing is one
+  bool has_catchers = false;
   std::string caustics_reason;  ///< why globals.caustics is enabled, or not
   KernelGlobals globals;
 

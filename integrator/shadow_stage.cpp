@@ -104,7 +104,7 @@ void intersect_shadow(const KernelGlobals& g,
     ray.tnear = kLeastDistance;
     ray.tfar = shadow.t_max[i];
     ray.time = path_time(state, shadow.path[i]);
-    ray.mask = kRayShadow;
+    ray.mask = g.catchers_alone ? kRayShadow << kRayCatchersShift : std::uint32_t{kRayShadow};
     ray.id = 0;
     ray.flags = 0;
     LodCone cone;

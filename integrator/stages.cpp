@@ -267,6 +267,39 @@ void shade_photons(const KernelGlobals& g,
   for (std::uint32_t i = 0; i < queue.size; ++i) shade_photon(g, sources, state, queue.paths[i], next, photons);
 }
 
+/// Adds a finished sample whose path has met a shadow catcher.
+/// @return  as film_add_sample
+[[gnu::noinline]] bool finish_caught(const KernelGlobals& g,
+                                     const PathState& state,
+                                     std::uint32_t path,
+                                     std::uint32_t sample,
+                                     Vec3f caustic)
+{
+  const CatcherState& c = state.catchers[path];
+  const std::uint32_t pixel = state.pixel[path];
+  float* record = film_record(g.film, pixel);
+  // Behind the catcher nothing counts: see shade_background.
+  film_add_clear(g.film, pixel, (state.flags[path] & kPathSawSurface) != 0 ? c.share : c.share - 1.0f);
+  if (g.film.layout.shadow_catcher) film_add_holdout(g.film, pixel, c.share);
+  record[g.film.layout.catcher + CatcherSums::kShare] += c.share;
+  const Vec3f before = c.direct + c.indirect + c.caustic;
+  // Where nothing was before, the same sum as that of a path without catchers: then both end in the film as the same number.
+  const Vec3f caught = (state.direct[path] - c.direct) + (state.indirect[path] - c.indirect) + (caustic - c.caustic);
+  if (!film_add_radiance(g.film, pixel, sample, before + caught)) return false;
+  const AccumulatorLayout& layout = g.film.layout;
+  if (layout.direct >= 0) film_add3(record + layout.direct, c.direct);
+  if (layout.caustic >= 0) film_add3(record + layout.caustic, c.caustic);
+  if (state.light_passes != nullptr) film_add_light_passes(g.film, pixel, c.light);
+  if (state.media != nullptr) {
+    const MediumLight light = medium_light(state.media[path], c.direct, c.indirect, c.caustic);
+    film_add_volume(g.film, pixel, light.direct, light.indirect);
+  }
+  // Of one that is not finite there is no shadow.
+  film_add_caught(g.film, pixel, sample, caught, is_finite(c.alone) ? c.alone : caught,
+                  is_finite(c.backdrop) ? c.backdrop : Vec3f{});
+  return true;
+}
+
 void finish(const KernelGlobals& g,
             PathState& state,
             const Batch& batch,
@@ -281,8 +314,12 @@ void finish(const KernelGlobals& g,
         counts ? next_sample(g, batch, state.pixel[i]) : batch.first_sample + i % batch.num_samples;
     Vec3f caustic;
     if (state.caustic.radiance != nullptr) caustic = (*state.caustic.radiance)[i];
-    const bool finite = film_add_sample(g.film, state.pixel[i], sample, state.direct[i], state.indirect[i], caustic);
+    const bool is_caught = __builtin_expect(state.catchers != nullptr, 0) && state.catchers[i].is_met;
+    const bool finite =
+        is_caught ? finish_caught(g, state, i, sample, caustic)
+                  : film_add_sample(g.film, state.pixel[i], sample, state.direct[i], state.indirect[i], caustic);
     if (finite) {
+      if (is_caught) continue;
       if (state.light_passes != nullptr) film_add_light_passes(g.film, state.pixel[i], state.light_passes[i].light);
       if (state.media != nullptr) {
         const MediumLight light = medium_light(state.media[i], state.direct[i], state.indirect[i], caustic);

@@ -27,6 +27,22 @@ std::uint64_t most_searches(const KernelGlobals& g)
          boundaries + 2;
 }
 
+/// Of paths where shadow catchers are alone.
+WavefrontColumns columns_alone(WavefrontColumns columns)
+{
+  columns.caustics = columns.light_passes = columns.catchers = false;
+  return columns;
+}
+
+/// Takes a path out of media that bound no shadow catcher.
+void leave_all_but_catchers(const KernelGlobals& g, MediumState& m)
+{
+  const auto stays = [&g](std::int32_t instance) {
+    return instance == kWholeWorld || (g.instances[instance].flags & kShadowCatcher) != 0;
+  };
+  m.size = static_cast<std::int32_t>(std::stable_partition(m.inside, m.inside + m.size, stays) - m.inside);
+}
+
 }  // namespace
 
 std::size_t Wavefront::bytes(const WavefrontColumns& columns)
@@ -36,7 +52,8 @@ std::size_t Wavefront::bytes(const WavefrontColumns& columns)
          (columns.media ? kColumnEntries * sizeof(MediumState) : 0u) +
          (columns.light_passes ? kColumnEntries * sizeof(LightPassState) : 0u) +
          (columns.gloss ? kColumnEntries * sizeof(LightGloss) : 0u) +
-         (columns.subsurface ? sizeof(SubsurfaceMemory) : 0u);
+         (columns.subsurface ? sizeof(SubsurfaceMemory) : 0u) +
+         (columns.catchers ? kBatchPaths * sizeof(CatcherState) + bytes(columns_alone(columns)) : 0u);
 }
 
 Wavefront::Wavefront(const WavefrontColumns& columns)
@@ -65,6 +82,11 @@ Wavefront::Wavefront(const WavefrontColumns& columns)
   if (columns.motion) {
     motion_memory_ = std::make_unique_for_overwrite<MotionMemory>();
     state_.motion = {motion_memory_->time, motion_memory_->instances, motion_memory_->meshes};
+  }
+  if (columns.catchers) {
+    catcher_memory_ = std::make_unique<CatcherState[]>(kBatchPaths);
+    state_.catchers = catcher_memory_.get();
+    alone_ = std::make_unique<Wavefront>(columns_alone(columns));
   }
   if (columns.subsurface) {
     subsurface_memory_ = std::make_unique_for_overwrite<SubsurfaceMemory>();
@@ -135,6 +157,88 @@ Vec3f Wavefront::first_radiance(std::uint32_t pixel) const
   return radiance;
 }
 
+void Wavefront::charge(Stage stage)
+{
+  const Clock::time_point now = Clock::now();
+  seconds[static_cast<std::size_t>(stage)] += std::chrono::duration<double>(now - last_).count();
+  last_ = now;
+}
+
+void Wavefront::search(const Tools& tools, bool camera, DisplacementWork& displacement)
+{
+  const auto& [g, accel, stages] = tools;
+  clear_queues();
+  intersect_closest(g, accel, state_, active_, camera, met_, displacement);
+  if (recorder != nullptr) record_rays();
+  charge(Stage::kIntersectClosest);
+  if (media == nullptr) return;
+  stages.shade_media(g, state_, met_, next_, shadow_);
+  charge(Stage::kShade);
+  trace_shadows(g, accel, ShadowStart::kInMedium, displacement);
+  charge(Stage::kIntersectShadow);
+  stages.accumulate_shadow(g, state_, shadow_, memory_->visibility);
+  shadow_.size = 0;
+}
+
+void Wavefront::shade(const Tools& tools, DisplacementWork& displacement)
+{
+  const auto& [g, accel, stages] = tools;
+  if (g.caustics.enabled) {
+    for (const QueueView& queue : met_.surfaces) stages.gather_photons(g, state_, queue);
+    charge(Stage::kGatherPhotons);
+  }
+  stages.shade_background(g, state_, met_.background, counters);
+  stages.shade_light(g, state_, met_.lights, next_);
+  for (std::size_t k = 0; k < kNumSurfaceKernels; ++k) {
+    if (met_.surfaces[k].size > 0) stages.shade_surface[k](g, state_, met_.surfaces[k], next_, shadow_, counters);
+  }
+  charge(Stage::kShade);
+
+  trace_shadows(g, accel, ShadowStart::kAtHit, displacement);
+  charge(Stage::kIntersectShadow);
+  stages.accumulate_shadow(g, state_, shadow_, memory_->visibility);
+  if (QueueView& entered = state_.subsurface.entered; entered.size > 0) {
+    charge(Stage::kShade);
+    QueueView left{subsurface_memory_->left};
+    walk_below_surfaces(g, accel, *stages.walks, state_, entered, left, displacement);
+    entered.size = 0;
+    charge(Stage::kIntersectClosest);
+    if (g.caustics.enabled) stages.gather_photons(g, state_, left);
+    shadow_.size = 0;
+    stages.leave_surfaces(g, state_, left, next_, shadow_, counters);
+    charge(Stage::kShade);
+    trace_shadows(g, accel, ShadowStart::kAtHit, displacement);
+    charge(Stage::kIntersectShadow);
+    stages.accumulate_shadow(g, state_, shadow_, memory_->visibility);
+  }
+  if (media != nullptr) {
+    for (std::uint32_t i = 0; i < next_.size; ++i) medium_follow(state_, next_.paths[i]);
+  }
+  std::swap(active_, next_);
+  charge(Stage::kShade);
+}
+
+bool Wavefront::follow(const Tools& tools, bool camera, DisplacementWork& displacement)
+{
+  // Graphs that were given up gave nothing that may count.
+  const auto is_stopped = [&] {
+    return displacement.total.stopped ||
+           (tools.g.graphs != nullptr && stop != nullptr && stop->load(std::memory_order_relaxed));
+  };
+  std::uint64_t searches_left = most_searches(tools.g);
+  for (; active_.size > 0 && !is_stopped(); camera = false) {
+    if (searches_left-- == 0) {
+      counters.endless_paths += active_.size;
+      break;
+    }
+    if (!camera) counters.bounce_rays += active_.size;
+    search(tools, camera, displacement);
+    if (alone_ != nullptr) split_at_catchers(tools.g);
+    shade(tools, displacement);
+  }
+  return !is_stopped();
+}
+
 bool Wavefront::run(const KernelGlobals& g,
                     const Accel& accel,
                     const StageTable& stages,
@@ -142,13 +246,8 @@ bool Wavefront::run(const KernelGlobals& g,
                     const Batch& batch)
 {
   RELIEF_ASSERT(static_cast<std::uint32_t>(batch.width * batch.height) * batch.num_samples <= kBatchPaths);
-  Clock::time_point last = Clock::now();
-  const auto charge = [&](Stage stage) {
-    const Clock::time_point now = Clock::now();
-    seconds[static_cast<std::size_t>(stage)] += std::chrono::duration<double>(now - last).count();
-    last = now;
-  };
-
+  RELIEF_ASSERT(alone_ == nullptr || catchers != nullptr);
+  last_ = Clock::now();
   met_.surface_kernel = surface_kernel.data();
   const std::uint32_t num_paths = stages.generate(g, state_, batch);
   active_.size = num_paths;
@@ -160,76 +259,106 @@ bool Wavefront::run(const KernelGlobals& g,
     std::iota(state_.caustic.root, state_.caustic.root + num_paths, 0u);
     state_.caustic.num_paths = num_paths;
   }
+  if (alone_ != nullptr) {
+    for (std::uint32_t i = 0; i < kBatchPaths; ++i) state_.catchers[i].is_met = i >= num_paths;
+    alone_->active_.size = 0;
+  }
   counters.camera_rays += num_paths;
   charge(Stage::kGenerate);
 
   DisplacementWork displacement;
   displacement.total.stop = stop;
   const GraphStop graphs(stop);
-  // Graphs that were given up gave nothing that may count.
-  const auto is_stopped = [&] {
-    return displacement.total.stopped ||
-           (g.graphs != nullptr && stop != nullptr && stop->load(std::memory_order_relaxed));
-  };
-  std::uint64_t searches_left = most_searches(g);
-  for (bool camera = true; active_.size > 0 && !is_stopped(); camera = false) {
-    if (searches_left-- == 0) {
-      counters.endless_paths += active_.size;
-      break;
-    }
-    if (!camera) counters.bounce_rays += active_.size;
-    clear_queues();
-    intersect_closest(g, accel, state_, active_, camera, met_, displacement);
-    if (recorder != nullptr) record_rays();
-    charge(Stage::kIntersectClosest);
-
-    if (media != nullptr) {
-      stages.shade_media(g, state_, met_, next_, shadow_);
-      charge(Stage::kShade);
-      trace_shadows(g, accel, ShadowStart::kInMedium, displacement);
-      charge(Stage::kIntersectShadow);
-      stages.accumulate_shadow(g, state_, shadow_, memory_->visibility);
-      shadow_.size = 0;
-    }
-    if (g.caustics.enabled) {
-      for (const QueueView& queue : met_.surfaces) stages.gather_photons(g, state_, queue);
-      charge(Stage::kGatherPhotons);
-    }
-    stages.shade_background(g, state_, met_.background, counters);
-    stages.shade_light(g, state_, met_.lights, next_);
-    for (std::size_t k = 0; k < kNumSurfaceKernels; ++k) {
-      if (met_.surfaces[k].size > 0) stages.shade_surface[k](g, state_, met_.surfaces[k], next_, shadow_, counters);
-    }
-    charge(Stage::kShade);
-
-    trace_shadows(g, accel, ShadowStart::kAtHit, displacement);
-    charge(Stage::kIntersectShadow);
-    stages.accumulate_shadow(g, state_, shadow_, memory_->visibility);
-    if (QueueView& entered = state_.subsurface.entered; entered.size > 0) {
-      charge(Stage::kShade);
-      QueueView left{subsurface_memory_->left};
-      walk_below_surfaces(g, accel, *stages.walks, state_, entered, left, displacement);
-      entered.size = 0;
-      charge(Stage::kIntersectClosest);
-      if (g.caustics.enabled) stages.gather_photons(g, state_, left);
-      shadow_.size = 0;
-      stages.leave_surfaces(g, state_, left, next_, shadow_, counters);
-      charge(Stage::kShade);
-      trace_shadows(g, accel, ShadowStart::kAtHit, displacement);
-      charge(Stage::kIntersectShadow);
-      stages.accumulate_shadow(g, state_, shadow_, memory_->visibility);
-    }
-    if (media != nullptr) {
-      for (std::uint32_t i = 0; i < next_.size; ++i) medium_follow(state_, next_.paths[i]);
-    }
-    std::swap(active_, next_);
-    charge(Stage::kShade);
-  }
-
+  const Tools tools{g, accel, stages};
+  const bool is_done =
+      follow(tools, true, displacement) && (alone_ == nullptr || follow_alone(tools, num_paths, displacement));
   note_displacement(displacement);
-  if (is_stopped()) return false;
+  if (!is_done) return false;
   stages.finish(g, state_, batch, num_paths, counters, first_nonfinite);
   charge(Stage::kFilm);
+  return true;
+}
+
+void Wavefront::split_at_catchers(const KernelGlobals& g)
+{
+  // Forks, which come of scattering, count as having met one.
+  const auto is_split = [&](std::uint32_t path) {
+    const std::uint32_t flags = g.instances[state_.hit_object[path]].flags;
+    if ((flags & (kShadowCatcher | kHoldout)) != kShadowCatcher || state_.catchers[path].is_met) return false;
+    return state_.bounces[path] == 0 || (g.clear_alpha >= 0.0f && (state_.flags[path] & kPathCovers) == 0);
+  };
+  PathState& copies = alone_->state_;
+  for (const QueueView& queue : met_.surfaces) {
+    for (std::uint32_t i = 0; i < queue.size; ++i) {
+      const std::uint32_t path = queue.paths[i];
+      if (!is_split(path)) continue;
+      CatcherState& c = state_.catchers[path];
+      c.is_met = true;
+      c.direct = state_.direct[path];
+      c.indirect = state_.indirect[path];
+      c.caustic = state_.caustic.radiance != nullptr ? Vec3f((*state_.caustic.radiance)[path]) : Vec3f{};
+      if (state_.light_passes != nullptr) std::ranges::copy(state_.light_passes[path].light, c.light);
+      c.share = light_scalar(state_.throughput[path]);
+      // What lies behind changes nothing of how much the film is covered.
+      state_.flags[path] |= kPathCovers;
+      path_copy(state_, path, copies, path);
+      if (const std::uint32_t flags = g.instances[state_.hit_object[path]].flags; (flags & (kMoves | kDeforms)) != 0) {
+        copies.motion.instances[path] = state_.motion.instances[path];
+        if ((flags & kDeforms) != 0) copies.motion.meshes[path] = state_.motion.meshes[path];
+      }
+      copies.flags[path] = path_flags_left_to_paths(state_.flags[path]) | kPathSawSurface | kPathSawFeature;
+      queue_push(alone_->active_, path);
+    }
+  }
+}
+
+bool Wavefront::follow_alone(const Tools& tools, std::uint32_t num_paths, DisplacementWork& displacement)
+{
+  Wavefront& alone = *alone_;
+  if (alone.active_.size == 0) return true;
+  alone.media = media;
+  alone.recorder = recorder;
+  alone.stop = stop;
+  alone.counters = {};
+  alone.seconds = {};
+  alone.last_ = Clock::now();
+  alone.met_.surface_kernel = catchers->surface_kernel->data();
+  const QueueView met{alone.active_.paths, alone.active_.size};
+  QueueView& background = alone.met_.background;
+  alone.clear_queues();
+  for (std::uint32_t i = 0; i < met.size; ++i) queue_push(background, met.paths[i]);
+  // In a catcher's place the camera would see the surroundings.
+  if (tools.g.environment_visible_to_camera) {
+    tools.stages.shade_background(tools.g, alone.state_, background, alone.counters);
+  }
+  for (std::uint32_t i = 0; i < met.size; ++i) {
+    const std::uint32_t path = met.paths[i];
+    state_.catchers[path].backdrop = alone.state_.direct[path];
+    alone.state_.direct[path] = Vec3f{};
+    if (media != nullptr) leave_all_but_catchers(tools.g, alone.state_.media[path]);
+  }
+
+  KernelGlobals g = tools.g;
+  g.catchers_alone = true;
+  g.lights.lights = catchers->lights;
+  g.caustics.enabled = false;
+  const int num_floats = g.film.layout.num_floats;
+  g.film.layout = {};
+  g.film.layout.num_floats = num_floats;
+  const Tools tools_alone{g, tools.accel, tools.stages};
+  alone.clear_queues();
+  for (std::uint32_t i = 0; i < met.size; ++i) {
+    const std::uint32_t path = met.paths[i];
+    hit_queue_push(alone.met_, path_instance(g, alone.state_, path), path);
+  }
+  alone.shade(tools_alone, displacement);
+  if (!alone.follow(tools_alone, false, displacement)) return false;
+  for (std::uint32_t i = 0; i < num_paths; ++i) {
+    if (state_.catchers[i].is_met) state_.catchers[i].alone = alone.state_.direct[i] + alone.state_.indirect[i];
+  }
+  counters_add(counters, alone.counters);
+  for (std::size_t i = 0; i < seconds.size(); ++i) seconds[i] += alone.seconds[i];
+  last_ = alone.last_;
   return true;
 }
 

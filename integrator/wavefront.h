@@ -3,6 +3,7 @@
 
 #include <array>
 #include <atomic>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -47,9 +48,16 @@ struct WavefrontColumns {
   bool subsurface = false;    ///< they may go below surfaces
   bool light_passes = false;  ///< layers tell their light apart by the first event
   bool gloss = false;         ///< lights, few, are chosen by what closures' gloss shows of them
+  bool catchers = false;      ///< they may meet shadow catchers
 };
 
 class Media;
+
+/// What is asked where shadow catchers are alone, in place of what there is for the whole scene.
+struct CatchersAlone {
+  const Light* lights = nullptr;                              ///< as LightsView::lights
+  const std::vector<std::uint8_t>* surface_kernel = nullptr;  ///< of each material; they know no photons
+};
 
 /// Owned by one thread at a time.
 class Wavefront {
@@ -83,6 +91,7 @@ class Wavefront {
   static std::size_t bytes(const WavefrontColumns& columns);
 
   const Media* media = nullptr;                  ///< null: there are none
+  const CatchersAlone* catchers = nullptr;       ///< null: there are no columns for them
   std::vector<RecordedRay>* recorder = nullptr;  ///< receives every ray of the batch, if set
   const std::atomic<bool>* stop = nullptr;       ///< true: searches in displaced meshes are given up; null: never
   Counters counters;
@@ -93,8 +102,30 @@ class Wavefront {
   std::uint64_t first_nonfinite = kNoSample;
 
  private:
+  /// What a batch is rendered with.
+  struct Tools {
+    const KernelGlobals& g;
+    const Accel& accel;
+    const StageTable& stages;
+  };
+
   void clear_queues();
   void drop_unseen(const KernelGlobals& g);
+  /// Charges the time since the last call, or the start of the batch, to a stage.
+  void charge(Stage stage);
+  /// Finds what the active paths meet, and takes them through media on the way.
+  void search(const Tools& tools, bool camera, DisplacementWork& displacement);
+  /// Shades what they have met; those that go on are active afterwards.
+  void shade(const Tools& tools, DisplacementWork& displacement);
+  /// Follows the active paths to their ends.
+  /// @param camera  they have just started
+  /// @return        false if `stop` ended it
+  bool follow(const Tools& tools, bool camera, DisplacementWork& displacement);
+  /// Copies paths whose camera rays have met a shadow catcher to alone_.
+  void split_at_catchers(const KernelGlobals& g);
+  /// Follows those copies where there are catchers only, and gives the paths what came of it.
+  /// @return  as follow
+  bool follow_alone(const Tools& tools, std::uint32_t num_paths, DisplacementWork& displacement);
   void trace_shadows(const KernelGlobals& g, const Accel& accel, ShadowStart start, DisplacementWork& displacement);
   void note_displacement(const DisplacementWork& work);
   void record_rays() const;
@@ -132,6 +163,10 @@ class Wavefront {
   std::unique_ptr<MediumState[]> medium_memory_;
   std::unique_ptr<LightPassState[]> light_pass_memory_;
   std::unique_ptr<LightGloss[]> gloss_memory_;
+  std::unique_ptr<CatcherState[]> catcher_memory_;
+  /// Of copies of paths that have met catchers, under the same numbers; null: nothing is one.
+  std::unique_ptr<Wavefront> alone_;
+  std::chrono::steady_clock::time_point last_;  ///< when time was charged last
   PathState& state_;
   ShadowQueue& shadow_;
   QueueView active_, next_;

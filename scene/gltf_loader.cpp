@@ -36,7 +36,8 @@ std::uint32_t instance_flags(const ObjectSettings& object, const Material& mater
   return (object.visible_to_camera ? kVisibleToCamera : 0u) | (object.casts_shadow ? kCastsShadow : 0u) |
          (transform_mirrors(world) ? kMirrored : 0u) | (caster ? kCausticCaster : 0u) |
          (object.caustic_receiver ? kCausticReceiver : 0u) | (object.caustic_light ? 0u : kNoCausticLight) |
-         (object.holdout ? kHoldout : 0u) | object.hidden_from << kHiddenFromShift;
+         (object.holdout ? kHoldout : 0u) | (object.shadow_catcher ? kShadowCatcher : 0u) |
+         object.hidden_from << kHiddenFromShift;
 }
 
 /// Texture coordinates that a material's normal maps are laid out in; −1: it has none.
@@ -500,6 +501,7 @@ void GltfLoader::place_lights(const PlacedNode& node)
       scene_.lights.insert(scene_.lights.end(), lights.begin(), lights.end());
       scene_.lights.back().casts_caustics = node.object.caustic_light;
       scene_.lights.back().hidden_from = static_cast<std::uint8_t>(node.object.hidden_from);
+      scene_.lights.back().in_footage = node.object.lights_footage;
       place_lamp(node, scene_.lights.back());
       move_light(node, path, scene_.lights.back());
     }

@@ -561,6 +561,8 @@ ObjectSettings relief_object(const GltfDocument& document, int node_index, Objec
     s.caustic_receiver = r.boolean("causticReceiver", s.caustic_receiver);
     s.caustic_light = r.boolean("causticLight", s.caustic_light);
     s.holdout = r.boolean("holdout", s.holdout);
+    s.shadow_catcher = r.boolean("shadowCatcher", s.shadow_catcher);
+    s.lights_footage = r.boolean("lightsFootage", s.lights_footage);
     s.hidden_from = read_hidden_from(r, s.hidden_from);
     s.asset = r.string("asset", s.asset);
     if (r.has("values")) s.values = read_object_values(r, s.values.get());

@@ -58,6 +58,8 @@ struct ObjectSettings {
   bool caustic_receiver = true;
   bool caustic_light = true;
   bool holdout = false;
+  bool shadow_catcher = false;
+  bool lights_footage = true;     ///< of lights: see Light::in_footage
   std::uint32_t hidden_from = 0;  ///< as Light::hidden_from
   std::string asset;              ///< empty: none is named
   /// Values by name that graphs read as attributes: three components and alpha. Null: none.

@@ -114,7 +114,8 @@ def _render(engine, depsgraph, binary, warnings, meshes, motion, eye, begin):
     report.last_coverage[scene.name] = warnings.coverage
     report.publish(scene.name, warnings.warnings)
 
-    aovs = result.aov_list(passes, exported.has_holdouts and not scene.render.film_transparent)
+    has_holes = exported.has_holdouts or any(p.aov == "shadow_catcher" for p in passes)
+    aovs = result.aov_list(passes, has_holes and not scene.render.film_transparent)
     number = "" if motion is None else f".{motion.frame}"
 
     def output(name, suffix):

@@ -57,6 +57,11 @@ def _with_zero(values, _):
     return np.concatenate([values, np.zeros((len(values), 1), dtype=np.float32)], axis=1)
 
 
+def _is_met(values, coverage):
+    """Where a layer has something: shadow catchers cover nothing where they are in no shadow. (pixels, 1)"""
+    return (coverage > 0)[:, None] | (values != 0).any(axis=1, keepdims=True)
+
+
 def _grey(values, _):
     return np.repeat(values, 3, axis=1)
 
@@ -87,14 +92,14 @@ def _light_passes():
 
 PASSES = (
     Pass("Depth", "use_pass_z", False, "depth", ("depth.Z",), "Z", "VALUE",
-         lambda z, coverage: np.where(coverage[:, None] > 0, z, np.float32(_FAR))),
+         lambda z, _: np.where(np.isfinite(z), z, np.float32(_FAR))),
     Pass("Mist", "use_pass_mist", False, "mist", ("mist.Z",), "Z", "VALUE"),
     Pass("Normal", "use_pass_normal", False, "normal", _xyz("normal"), "XYZ", "VECTOR",
          lambda n, _: blender_from_gltf(n)),
     Pass("Position", "use_pass_position", False, "position", _xyz("position"), "XYZ", "VECTOR",
          lambda p, _: blender_from_gltf(p)),
     Pass("UV", "use_pass_uv", False, "uv", ("uv.U", "uv.V"), "UVA", "VECTOR",
-         lambda uv, coverage: _with_zero(uv * (1, -1) + (0, 1) * (coverage[:, None] > 0), coverage)),
+         lambda uv, coverage: _with_zero(uv * (1, -1) + (0, 1) * _is_met(uv, coverage), coverage)),
     *_light_passes(),
     Pass(compat.pass_name("Emit"), "use_pass_emit", False, "emission", _rgb("emission"), "RGB", "COLOR"),
     Pass(compat.pass_name("Env"), "use_pass_environment", False, "environment", _rgb("environment"), "RGB", "COLOR"),
@@ -104,6 +109,8 @@ PASSES = (
          owner="cycles"),
     Pass(compat.pass_name("VolumeInd"), "use_pass_volume_indirect", True, "volume_indirect", _rgb("volume_indirect"), "RGB",
          "COLOR", owner="cycles"),
+    Pass("Shadow Catcher", "use_pass_shadow_catcher", True, "shadow_catcher", _rgb("shadow_catcher"), "RGB", "COLOR",
+         owner="cycles"),
     Pass("Denoising Normal", "denoising_store_passes", True, "denoising_normal", _xyz("denoising_normal"), "XYZ", "VECTOR",
          owner="cycles"),
     Pass("Denoising Albedo", "denoising_store_passes", True, "denoising_albedo", _rgb("denoising_albedo"), "RGB", "COLOR",

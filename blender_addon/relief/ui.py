@@ -387,6 +387,7 @@ class RELIEF_PT_passes(_LayerPanel, bpy.types.Panel):
         for name in dict.fromkeys(p.setting for p in PASSES if not p.owner):
             rows.prop(layer, name)
         if hasattr(layer, "cycles"):
+            rows.prop(layer.cycles, "use_pass_shadow_catcher")
             rows.prop(layer.cycles, "denoising_store_passes")
         rows.separator()
         for kind in CRYPTOMATTES:
@@ -608,6 +609,7 @@ class RELIEF_PT_object_ray_visibility(_SeenObjectPanel, bpy.types.Panel):
         for ray in ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow"):
             if ray != "shadow" or shown.type != "LIGHT":
                 rows.prop(shown, f"visible_{ray}", text=ray.replace("_", " ").title())
+        rows.prop(shown, "is_shadow_catcher")
 
 
 class RELIEF_PT_object_caustics(_SeenObjectPanel, bpy.types.Panel):

@@ -23,12 +23,24 @@ struct AccumulatorLayout {
       denoising_half = -1, volume_direct = -1, volume_indirect = -1;
   int light_passes[kNumLightPasses] = {-1, -1, -1, -1, -1, -1};
   int event_colors[kNumEventKinds] = {-1, -1, -1};
+  int catcher = -1;             ///< CatcherSums: where something is a shadow catcher
+  bool shadow_catcher = false;  ///< the layer of that name is kept
   int samples = -1;  ///< that the pixel has had, and whether it rests: where noise ends pixels one by one
   int cryptomatte[kNumCryptomattes] = {-1, -1, -1};  ///< pairs of an id and its weight, the first of weight 0 is free
   int cryptomatte_levels = 0;
   bool light_by_event = false;  ///< any of light_passes or event_colors is kept
   bool denoising = false;       ///< denoising_albedo, denoising_normal or denoising_half is kept
   int num_floats = kAlways;
+};
+
+/// Offsets of what a pixel has of shadow catchers: sums over its samples, and over the even-numbered ones.
+struct CatcherSums {
+  static constexpr int kShare = 0;  ///< see CatcherState::share
+  static constexpr int kAll = 1, kEven = 10;
+  static constexpr int kCaught = 0;    ///< R, G, B of the light that they send, which is in the beauty as well
+  static constexpr int kAlone = 3;     ///< R, G, B of what it would be if there were catchers only
+  static constexpr int kBackdrop = 6;  ///< R, G, B of what the camera would see in their place
+  static constexpr int kNumFloats = 19;
 };
 
 /// Sums of all pixels of the window; each pixel is written by one thread at a time.
@@ -202,9 +214,27 @@ RELIEF_KERNEL bool film_pixel_rests(const FilmAccumulatorView& film, std::uint32
   return film.layout.samples >= 0 && film_record(film, pixel)[film.layout.samples + 1] != 0.0f;
 }
 
-/// Adds a finished sample.
+/// Adds what a finished sample brought to the beauty, and to what errors are known by.
 /// @param sample  of the pixel, counted from 0
 /// @return false when the sample is not finite; it then counts as black
+RELIEF_KERNEL bool film_add_radiance(const FilmAccumulatorView& film,
+                                     std::uint32_t pixel,
+                                     std::uint32_t sample,
+                                     Vec3f radiance)
+{
+  const AccumulatorLayout& layout = film.layout;
+  float* record = film_record(film, pixel);
+  if (layout.samples >= 0) record[layout.samples] += 1.0f;
+  if (!is_finite(radiance)) return false;
+  film_add3(record + AccumulatorLayout::kBeauty, radiance);
+  film_add3(record + AccumulatorLayout::kSquares, radiance * radiance);
+  if ((sample & 1u) == 0) film_add3(record + AccumulatorLayout::kEven, radiance);
+  if ((sample & 3u) == 0) film_add3(record + AccumulatorLayout::kQuarter0, radiance);
+  if ((sample & 3u) == 1) film_add3(record + AccumulatorLayout::kQuarter1, radiance);
+  return true;
+}
+
+/// Adds a finished sample, as film_add_radiance.
 RELIEF_KERNEL bool film_add_sample(const FilmAccumulatorView& film,
                                    std::uint32_t pixel,
                                    std::uint32_t sample,
@@ -214,17 +244,31 @@ RELIEF_KERNEL bool film_add_sample(const FilmAccumulatorView& film,
 {
   const AccumulatorLayout& layout = film.layout;
   float* record = film_record(film, pixel);
-  if (layout.samples >= 0) record[layout.samples] += 1.0f;
-  const Vec3f radiance = direct + indirect + caustic;
-  if (!is_finite(radiance)) return false;
-  film_add3(record + AccumulatorLayout::kBeauty, radiance);
-  film_add3(record + AccumulatorLayout::kSquares, radiance * radiance);
-  if ((sample & 1u) == 0) film_add3(record + AccumulatorLayout::kEven, radiance);
-  if ((sample & 3u) == 0) film_add3(record + AccumulatorLayout::kQuarter0, radiance);
-  if ((sample & 3u) == 1) film_add3(record + AccumulatorLayout::kQuarter1, radiance);
+  if (!film_add_radiance(film, pixel, sample, direct + indirect + caustic)) return false;
   if (layout.direct >= 0) film_add3(record + layout.direct, direct);
   if (layout.caustic >= 0) film_add3(record + layout.caustic, caustic);
   return true;
+}
+
+/// Adds what a finished sample brought from a shadow catcher, which is in no layer of light.
+/// @param caught           light that came from there, finite and in the beauty, too
+/// @param alone, backdrop  see CatcherState; finite
+/// @pre   the film keeps sums of catchers
+RELIEF_KERNEL void film_add_caught(const FilmAccumulatorView& film,
+                                   std::uint32_t pixel,
+                                   std::uint32_t sample,
+                                   Vec3f caught,
+                                   Vec3f alone,
+                                   Vec3f backdrop)
+{
+  float* sums = film_record(film, pixel) + film.layout.catcher;
+  const auto add = [&](float* part) {
+    film_add3(part + CatcherSums::kCaught, caught);
+    film_add3(part + CatcherSums::kAlone, alone);
+    film_add3(part + CatcherSums::kBackdrop, backdrop);
+  };
+  add(sums + CatcherSums::kAll);
+  if ((sample & 1u) == 0) add(sums + CatcherSums::kEven);
 }
 
 }  // namespace relief

@@ -25,6 +25,7 @@ enum class Aov : std::uint8_t {
   kDisplacementSteps,
   kCaustic,
   kHoldout,
+  kShadowCatcher,
   kMist,
   kEmission,
   kEnvironment,
@@ -48,7 +49,7 @@ enum class Aov : std::uint8_t {
   kCryptoMaterial,
   kCryptoAsset,
 };
-inline constexpr int kNumAovs = 38;
+inline constexpr int kNumAovs = 39;
 
 /// Sets of AOVs: bit i is enumerator i.
 using AovMask = std::uint64_t;
@@ -109,6 +110,8 @@ inline constexpr std::array<AovInfo, kNumAovs> kAovInfo = {{
      "bounds and texels of displaced meshes tested for a camera ray, averaged"},
     {Aov::kCaustic, "caustic", "RGB", false, "light that the photon pass brought; part of indirect"},
     {Aov::kHoldout, "holdout", "A", false, "share of the samples that met a holdout, where the picture has a hole"},
+    {Aov::kShadowCatcher, "shadow_catcher", "RGB", false,
+     "what the scene leaves of the light on shadow catchers; 1 elsewhere. Beauty then shows neither them nor shadows"},
     {Aov::kMist, "mist", "Z", false, "0 at RELIEF_render's mist.start … 1 at its end and where nothing is met"},
     {Aov::kEmission, "emission", "RGB", false, "what surfaces and lights send straight to the camera"},
     {Aov::kEnvironment, "environment", "RGB", false, "the surroundings where the camera meets them, shown or not"},

@@ -78,12 +78,13 @@ enum InstanceFlag : std::uint32_t {
   kGathersPhotons = 1u << 7,       ///< a receiver that has soft lobes, in a render with a photon pass
   kGathersTails = 1u << 9,         ///< likewise, a rough caster: see path_gathers_tails
   kHoldout = 1u << 10,             ///< a hole in the picture where the camera sees it; an object for all other rays
-  kMoves = 1u << 11,      ///< while the shutter is open: hits bring a placement of their own, see path_instance
-  kDeforms = 1u << 12,    ///< likewise, and a mesh: see path_mesh
-  kCurves = 1u << 13,     ///< its mesh is one of curves
-  kRibbons = 1u << 14,    ///< these are flat and face the ray
-  kHiddenFromShift = 15,  ///< position of four bits, as of Light::hidden_from: bounced rays that do not meet it
-  kPoints = 1u << 19,     ///< with kCurves: they are single points, balls
+  kMoves = 1u << 11,          ///< while the shutter is open: hits bring a placement of their own, see path_instance
+  kDeforms = 1u << 12,        ///< likewise, and a mesh: see path_mesh
+  kCurves = 1u << 13,         ///< its mesh is one of curves
+  kRibbons = 1u << 14,        ///< these are flat and face the ray
+  kHiddenFromShift = 15,      ///< position of four bits, as of Light::hidden_from: bounced rays that do not meet it
+  kPoints = 1u << 19,         ///< with kCurves: they are single points, balls
+  kShadowCatcher = 1u << 20,  ///< the camera sees of it what all that is none takes from its light
 };
 
 inline constexpr std::uint32_t kHiddenFrom = 0xfu << kHiddenFromShift;

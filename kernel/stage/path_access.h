@@ -263,28 +263,35 @@ RELIEF_KERNEL void medium_follow(PathState& state, std::uint32_t path)
   if (has_passed) medium_cross(m, m.hit_inside, m.hit_front);
 }
 
+/// Copies all that a path's way on depends on, but what is at its present hit while the shutter is open; the copy has brought nothing
+/// yet.
+RELIEF_KERNEL void path_copy(const PathState& from, std::uint32_t i, PathState& to, std::uint32_t copy)
+{
+#define X(type, name) to.name[copy] = from.name[i];
+#include "kernel/state/path_state_fields.inc"
+#undef X
+  if (from.motion.time != nullptr) to.motion.time[copy] = from.motion.time[i];
+  if (from.facets != nullptr) to.facets[copy] = from.facets[i];
+  if (from.scatter_gloss != nullptr) to.scatter_gloss[copy] = from.scatter_gloss[i];
+  if (from.media != nullptr) {
+    to.media[copy] = from.media[i];
+    MediumState& m = to.media[copy];
+    m.lit = m.caustic = m.before[0] = m.before[1] = Vec3f{};
+  }
+  to.direct[copy] = to.indirect[copy] = Vec3f{};
+}
+
 /// Copies a path that can go on in two ways; the copy has brought nothing yet.
 /// @pre there is room, see path_has_room
 RELIEF_KERNEL std::uint32_t path_fork(PathState& s, std::uint32_t i)
 {
   const std::uint32_t copy = s.caustic.num_paths++;
-#define X(type, name) s.name[copy] = s.name[i];
-#include "kernel/state/path_state_fields.inc"
-#undef X
+  path_copy(s, i, s, copy);
   s.caustic.root[copy] = s.caustic.root[i];
-  if (s.motion.time != nullptr) s.motion.time[copy] = s.motion.time[i];
-  if (s.facets != nullptr) s.facets[copy] = s.facets[i];
-  if (s.scatter_gloss != nullptr) s.scatter_gloss[copy] = s.scatter_gloss[i];
-  if (s.media != nullptr) {
-    s.media[copy] = s.media[i];
-    MediumState& m = s.media[copy];
-    m.lit = m.caustic = m.before[0] = m.before[1] = Vec3f{};
-  }
   if (s.light_passes != nullptr) {
     s.light_passes[copy] = s.light_passes[i];
     for (Vec3f& light : s.light_passes[copy].light) light = {};
   }
-  s.direct[copy] = s.indirect[copy] = Vec3f{};
   (*s.caustic.radiance)[copy] = Vec3f{};
   return copy;
 }

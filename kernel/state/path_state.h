@@ -93,6 +93,16 @@ struct MotionStateView {
   MeshView* meshes = nullptr;  ///< likewise, of one that deforms
 };
 
+/// What a path has of the shadow catcher that it met first.
+struct CatcherState {
+  bool is_met = false;
+  Vec3f direct, indirect, caustic;  ///< what the path had brought before
+  Vec3f light[kNumLightPasses];     ///< likewise, where layers tell light apart by its first event
+  float share = 0;                  ///< of its light that what is before the catcher lets through
+  Vec3f alone;                      ///< what the path would have brought from there if there were catchers only
+  Vec3f backdrop;                   ///< what the camera would see in the catcher's place
+};
+
 /// Columns of all paths of a batch. They lie at fixed places, so that one register reaches them all.
 struct alignas(64) PathState {
 #define X(type, name) PathColumn<type> name;
@@ -105,6 +115,7 @@ struct alignas(64) PathState {
   MediumState* media = nullptr;            ///< null where nothing has a medium
   LightPassState* light_passes = nullptr;  ///< null where no layer tells light apart by its first event
   LightGloss* scatter_gloss = nullptr;     ///< beside scatter_N; null: lights are chosen without
+  CatcherState* catchers = nullptr;        ///< null where nothing is a shadow catcher
 };
 
 enum PathFlag : std::uint32_t {

@@ -11,7 +11,6 @@ from scenes import (
     add_plane,
     add_sphere,
     assert_agrees,
-    assert_warns,
     degrees,
     diffuse,
     folder,
@@ -227,9 +226,3 @@ def test_film_exposure_of_passes():
         factor = {"Variance": 16, "Samples": 1, "DiffCol": 1, "Diffuse Color": 1}.get(layer_name, 4)
         factor = 1 if name.endswith(".A") else factor
         assert np.allclose(factor * first, pictures[1][name], rtol=1e-5, atol=1e-7), name
-
-
-def test_a_shadow_catcher_is_warned_about():
-    scene, _ = _stage()
-    next(o for o in scene.objects if o.name.startswith("Sphere")).is_shadow_catcher = True
-    assert_warns(scene, "shadow catcher", "ordinary object")

@@ -21,8 +21,6 @@ _MISSING = {
     "*: CyclesCurveRenderSettings.*subdivisions": "ribbons are as smooth as they are traced",
     "render: RenderSettings.hair_*": "of other engines",
     "render: operator *hair*": "of other engines",
-    "object: Object.is_shadow_catcher": "no shadow catchers; a warning tells",
-    "view_layer: *.use_pass_shadow_catcher": "no shadow catchers",
     "*: *light*group*": "no light groups; a warning tells",
     "*: menu VIEWLAYER_MT_lightgroup_sync": "no light groups",
     "object: ObjectLightLinking.*": "no light linking; a warning tells",

@@ -165,6 +165,33 @@ TEST(Composition, ObjectSettingsAreInheritedAndOverruled)
   EXPECT_EQ(scene.instances[1].flags, kCastsShadow);
 }
 
+TEST(Composition, ShadowCatchersAreInheritedAndNoNumbers)
+{
+  GltfBuilder b = test::square_scene();
+  b.json["nodes"] = {{{"children", {1, 2}}, {"extensions", {{"RELIEF_object", {{"shadowCatcher", true}}}}}},
+                     {{"mesh", 0}},
+                     {{"extensions",
+                       {{"RELIEF_area_light", {{"radiance", 1}}},
+                        {"RELIEF_object", {{"shadowCatcher", false}, {"lightsFootage", false}}}}},
+                      {"mesh", 0}}};
+  const Scene scene = load(b);
+  ASSERT_EQ(scene.instances.size(), 2u);
+  EXPECT_NE(scene.instances[0].flags & kShadowCatcher, 0u);
+  EXPECT_EQ(scene.instances[1].flags & kShadowCatcher, 0u);
+  ASSERT_EQ(scene.lights.size(), 1u);
+  EXPECT_FALSE(scene.lights[0].in_footage);
+  for (const char* name : {"shadowCatcher", "lightsFootage"}) {
+    b.json["nodes"][0]["extensions"]["RELIEF_object"] = {{name, 1}};
+    try {
+      load(b);
+      ADD_FAILURE() << "expected an error";
+    } catch (const SceneError& e) {
+      EXPECT_EQ(e.json_path, std::string("/nodes/0/extensions/RELIEF_object/") + name);
+      EXPECT_EQ(e.expected, "true or false");
+    }
+  }
+}
+
 // --- EXT_mesh_gpu_instancing ---
 
 TEST(Instancing, PlacesCopiesInTheNodesSpace)

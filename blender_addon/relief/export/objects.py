@@ -48,6 +48,7 @@ class Things:
     kind      "geometry" or "light"
     data      evaluated mesh of an instance that geometry nodes made; None: the object's own
     role      Role in the view layer
+    is_catcher  it catches shadows; of a light: it shines in the footage, too, which what catches shadows stands for
     matrices  world matrices, row-major, one a place: list of 16 floats each
     places    Place of each, where value graphs may read them; else empty
     surface   its surface is shown
@@ -60,6 +61,7 @@ class Things:
     kind: str
     data: object = None
     role: Role = Role()
+    is_catcher: bool = False
     matrices: list = field(default_factory=list)
     places: list = field(default_factory=list)
     surface: bool = True
@@ -99,10 +101,15 @@ def collect(depsgraph, report):
         if roles:  # an instance has the role of what makes it
             owner = instance.parent if instance.is_instance else shown
             role = roles.get(owner.original.as_pointer(), role)
-        key = (original.as_pointer(), data.as_pointer() if data is not None else 0, role, surface, strands)
+        is_catcher = shown.is_shadow_catcher
+        if kind == "geometry" and instance.is_instance:  # or what makes it
+            is_catcher = is_catcher or instance.parent.is_shadow_catcher
+        key = (original.as_pointer(), data.as_pointer() if data is not None else 0, role, is_catcher, surface, strands)
         thing = things.get(key)
         if thing is None:
-            thing = things[key] = Things(original, shown.name, kind, role=role, surface=surface, strands=strands)
+            thing = things[key] = Things(
+                original, shown.name, kind, role=role, is_catcher=is_catcher, surface=surface, strands=strands
+            )
             if instance.is_instance and kind == "geometry" and _is_made(shown, original, depsgraph):
                 thing.data = data
             if shown.type == "VOLUME":

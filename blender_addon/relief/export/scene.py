@@ -366,6 +366,8 @@ class SceneExporter:
         if thing.role.holdout:
             self.has_holdouts = True
             settings["holdout"] = True
+        if thing.is_catcher:
+            settings["shadowCatcher"] = True
         if self._depsgraph.view_layer.use_pass_cryptomatte_asset:
             settings["asset"] = _asset_name(original)
         if not original.visible_shadow:
@@ -381,8 +383,6 @@ class SceneExporter:
             settings["causticReceiver"] = False
         if not caustics.caustic_light:
             settings["causticLight"] = False
-        if original.is_shadow_catcher:
-            warn("a shadow catcher", "it is an ordinary object")
         return settings
 
     def _mesh_of(self, thing, shapes):
@@ -515,6 +515,8 @@ class SceneExporter:
             settings = _ray_settings(original)
             if not original.relief.caustic_light:
                 settings["causticLight"] = False
+            if not thing.is_catcher:
+                settings["lightsFootage"] = False
             if settings:
                 self.writer.extend(node, "RELIEF_object", settings)
             self.nodes.append(node)
