@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "exporters/picture.h"
+
 namespace relief {
 
 namespace {
@@ -75,7 +77,9 @@ std::optional<std::size_t> color_component(std::string_view channel)
   const std::size_t dot = channel.rfind('.');
   const std::string_view layer = dot == std::string_view::npos ? std::string_view() : channel.substr(0, dot);
   const std::string_view last = dot == std::string_view::npos ? channel : channel.substr(dot + 1);
-  if (last.size() != 1 || std::find(kColorLayers.begin(), kColorLayers.end(), layer) == kColorLayers.end()) return {};
+  const bool is_color = std::find(kColorLayers.begin(), kColorLayers.end(), layer) != kColorLayers.end() ||
+                        layer.starts_with(kLightGroupLayer);
+  if (last.size() != 1 || !is_color) return {};
   const std::size_t component = std::string_view("RGB").find(last[0]);
   if (component == std::string_view::npos) return {};
   return component;

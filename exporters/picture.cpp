@@ -47,7 +47,7 @@ std::string attribute_number(double value)
   return text;
 }
 
-std::string channel_name(const AovInfo& info, std::size_t channel)
+std::string channel_name(const AovInfo& info, std::size_t channel, const std::string* light_groups)
 {
   if (info.channels.empty()) {
     // By its specification, one layer for every two levels.
@@ -55,7 +55,8 @@ std::string channel_name(const AovInfo& info, std::size_t channel)
     const int index = static_cast<int>(info.aov) - kFirstCryptomatte;
     return std::string(cryptomatte_layer(index)) + digits + "." + "rgba"[channel % 4];
   }
-  const std::string letter(1, info.channels[channel]);
+  const std::string letter(1, info.channels[channel % info.channels.size()]);
+  if (info.aov == Aov::kLightGroups) return std::string(kLightGroupLayer) + light_groups[channel / 3] + "." + letter;
   return info.aov == Aov::kBeauty ? letter : std::string(info.name) + "." + letter;
 }
 
@@ -65,11 +66,11 @@ ImageView film_layer(const FilmView& film, Aov aov)
   const int offset = film.layout.offset[static_cast<std::size_t>(aov)];
   if (offset < 0) return view;
   const AovInfo& info = kAovInfo[static_cast<std::size_t>(aov)];
-  const int num_channels = aov_num_channels(info, film.layout.cryptomatte_levels);
+  const int num_channels = aov_num_channels(info, film.layout);
   for (int c = 0; c < num_channels; ++c) {
     const std::ptrdiff_t pixel_stride = film.layout.num_floats;
     view.channels.push_back({film.pixels + offset + c, pixel_stride, pixel_stride * film.width, ChannelType::kFloat,
-                             channel_name(info, static_cast<std::size_t>(c))});
+                             channel_name(info, static_cast<std::size_t>(c), film.light_groups)});
   }
   return view;
 }

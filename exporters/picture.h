@@ -59,8 +59,12 @@ struct Picture {
   const Channel* find(std::string_view name) const;
 };
 
+/// How the name of the layer of a group of lights begins.
+inline constexpr std::string_view kLightGroupLayer = "light_group_";
+
 /// Name of an AOV's channel in a file: the beauty's are "R" … "A", others are layers, "albedo.R".
-std::string channel_name(const AovInfo& info, std::size_t channel);
+/// @param light_groups  names, for Aov::kLightGroups
+std::string channel_name(const AovInfo& info, std::size_t channel, const std::string* light_groups = nullptr);
 
 /// The channels of one AOV of a film. @return no channels if the film does not keep it
 ImageView film_layer(const FilmView& film, Aov aov);

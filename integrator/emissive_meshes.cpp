@@ -140,7 +140,7 @@ std::vector<EmissiveMesh> emissive_meshes(const Scene& scene, LightSet& set)
     if (may_share && is_similarity(instance.world_from_object, &scale)) {
       const auto [place, is_new] =
           known.try_emplace({instance.mesh_index, instance.material_index,
-                             instance.flags & (kNoCausticLight | kHiddenFrom | kShadowCatcher)},
+                             instance.flags & (kNoCausticLight | kHiddenFrom | kShadowCatcher | kLightGroup)},
                             meshes.size());
       if (!is_new) {
         meshes[place->second].instances.push_back(i);
@@ -196,6 +196,7 @@ void emissive_meshes_add(const Scene& scene,
       light.hidden_from = static_cast<std::uint8_t>((instance.flags & kHiddenFrom) >> kHiddenFromShift);
       light.casts_caustics =
           (instance.flags & kNoCausticLight) == 0 && light.hidden_from == 0 && !is_dark && !asks_for_path;
+      light.light_group = static_cast<std::uint8_t>((instance.flags & kLightGroup) >> kLightGroupShift);
       light.in_footage = (instance.flags & kShadowCatcher) != 0;
       light.instance_index = static_cast<std::int32_t>(i);
       set.lights[emissive.first_light + triangle] = light;

@@ -21,7 +21,8 @@ AccumulatorLayout layout_make(AovMask aov_mask,
                               int cryptomatte_levels,
                               bool keeps_clear,
                               bool counts_samples,
-                              bool keeps_catchers)
+                              bool keeps_catchers,
+                              int num_light_groups)
 {
   AccumulatorLayout layout;
   layout.cryptomatte_levels = cryptomatte_levels;
@@ -52,6 +53,7 @@ AccumulatorLayout layout_make(AovMask aov_mask,
   keep(Aov::kDenoisingHalf, 7, layout.denoising_half);
   keep(Aov::kVolumeDirect, 3, layout.volume_direct);
   keep(Aov::kVolumeIndirect, 3, layout.volume_indirect);
+  keep(Aov::kLightGroups, 3 * num_light_groups, layout.light_groups);
   for (int i = 0; i < kNumLightPasses; ++i) keep(light_pass_aov(i), 3, layout.light_passes[i]);
   for (int i = 0; i < kNumEventKinds; ++i) keep(event_color_aov(i), 3, layout.event_colors[i]);
   const auto is_kept = [](int offset) { return offset >= 0; };
@@ -72,7 +74,8 @@ AccumulatorLayout layout_make(AovMask aov_mask,
     keep(static_cast<Aov>(kFirstCryptomatte + i), 2 * cryptomatte_levels, layout.cryptomatte[i]);
   }
   // The finished planes take the place of the sums.
-  layout.num_floats = std::max(layout.num_floats, film_layout_make(aov_mask, cryptomatte_levels).num_floats);
+  layout.num_floats =
+      std::max(layout.num_floats, film_layout_make(aov_mask, cryptomatte_levels, num_light_groups).num_floats);
   return layout;
 }
 
@@ -223,13 +226,16 @@ Film::Film(int width,
            int cryptomatte_levels,
            bool keeps_clear,
            bool counts_samples,
-           bool keeps_catchers)
+           bool keeps_catchers,
+           int num_light_groups)
     : width_(width),
       height_(height),
       tiles_x_((width + kTileSize - 1) / kTileSize),
       tiles_y_((height + kTileSize - 1) / kTileSize),
       aov_mask_(aov_mask | aov_bit(Aov::kBeauty)),
-      layout_(layout_make(aov_mask_, cryptomatte_levels, keeps_clear, counts_samples, keeps_catchers)),
+      num_light_groups_(num_light_groups),
+      layout_(
+          layout_make(aov_mask_, cryptomatte_levels, keeps_clear, counts_samples, keeps_catchers, num_light_groups)),
       sums_(sums_size(width, height, layout_)),
       samples_(static_cast<std::size_t>(tiles_x_) * static_cast<std::size_t>(tiles_y_))
 {
@@ -566,6 +572,9 @@ void Film::resolve_pixel(const float* in,
   }
   if (float* p = plane(Aov::kVolumeDirect)) put3(p, load3(in + layout_.volume_direct) * light);
   if (float* p = plane(Aov::kVolumeIndirect)) put3(p, load3(in + layout_.volume_indirect) * light);
+  if (float* p = plane(Aov::kLightGroups)) {
+    for (int i = 0; i < 3 * num_light_groups_; ++i) p[i] = in[layout_.light_groups + i] * light;
+  }
   for (int i = 0; i < kNumLightPasses; ++i) {
     if (float* p = plane(light_pass_aov(i))) put3(p, load3(in + layout_.light_passes[i]) * light);
   }
@@ -634,7 +643,7 @@ Vec3f Film::variance_shown(const float* record, std::uint32_t samples) const
 FilmView Film::window(AovMask aov_mask, int crop_x, int crop_y, int full_width, int full_height) const
 {
   FilmView view;
-  view.layout = film_layout_make(aov_mask, layout_.cryptomatte_levels);
+  view.layout = film_layout_make(aov_mask, layout_.cryptomatte_levels, num_light_groups_);
   view.width = width_;
   view.height = height_;
   view.crop_x = crop_x;

@@ -71,13 +71,15 @@ class Film {
   /// @param keeps_clear         alpha is not coverage by surfaces alone, see film_add_clear
   /// @param counts_samples      each pixel has a number of its own, see judge
   /// @param keeps_catchers      there are shadow catchers; if so, keeps_clear
+  /// @param num_light_groups    of the scene
   Film(int width,
        int height,
        AovMask aov_mask,
        int cryptomatte_levels = 6,
        bool keeps_clear = false,
        bool counts_samples = false,
-       bool keeps_catchers = false);
+       bool keeps_catchers = false,
+       int num_light_groups = 0);
 
   FilmAccumulatorView accumulator();
   int width() const { return width_; }
@@ -177,6 +179,7 @@ class Film {
 
   int width_, height_, tiles_x_, tiles_y_;
   AovMask aov_mask_;
+  int num_light_groups_;
   AccumulatorLayout layout_;
   std::vector<float> sums_;
   std::vector<std::uint32_t> samples_;

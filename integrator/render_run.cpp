@@ -216,7 +216,8 @@ Film film_make(const Scene& scene, const RenderOptions& options, bool has_catche
       settings.cryptomatte_levels,
       !scene.environment.visible_to_camera || has_holdouts(scene) || has_media(scene) || is_panoramic || has_catchers,
       settings.noise_threshold > 0,
-      has_catchers};
+      has_catchers,
+      static_cast<int>(scene.light_groups.size())};
 }
 
 RenderRun::RenderRun(const Scene& scene,
@@ -503,6 +504,7 @@ RenderedImage RenderRun::finish()
   }
   RenderedImage image =
       std::move(film_).resolve(window_.x0, window_.y0, settings_.width, settings_.height, settings_.film_exposure);
+  image.view.light_groups = scene_.light_groups.data();
   image.saved = std::move(saved);
   return image;
 }

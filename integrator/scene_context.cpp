@@ -209,6 +209,7 @@ SceneContext::SceneContext(const Scene& loaded,
   const std::optional<float>& clear = scene.environment.clear_roughness;
   globals.clear_alpha = clear && !scene.environment.visible_to_camera ? *clear * *clear : -1.0f;
   globals.environment_hidden_from = scene.environment.hidden_from;
+  globals.environment_light_group = scene.environment.light_group;
   if (const std::optional<Surroundings>& seen = scene.environment.backdrop) {
     globals.has_backdrop = true;
     if (seen->graph) {

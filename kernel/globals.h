@@ -85,6 +85,7 @@ struct KernelGlobals {
   bool has_backdrop = false;
   EnvironmentView backdrop;                   ///< what camera rays see in the environment's place
   std::uint32_t environment_hidden_from = 0;  ///< as Environment::hidden_from
+  std::uint32_t environment_light_group = 0;  ///< as Light::light_group
   bool catchers_alone = false;                ///< rays meet shadow catchers and lights only
   Mist mist;
   float occlusion_distance = 10;  ///< metres, for Aov::kAmbientOcclusion

@@ -142,13 +142,14 @@ void GltfLoader::set_environment(const LoadOptions& options)
 {
   std::optional<Environment> environment;
   if (!options.environment) {
-    environment = relief_environment(*root_, textures_, warnings_);
+    environment = relief_environment(*root_, textures_, scene_.light_groups, warnings_);
   } else {
     environment.emplace();
     // The scene's own is not read, and may well be what is missing; but no output may take its place.
     try {
       TextureTable replaced;
-      relief_environment(*root_, replaced, warnings_);
+      std::vector<std::string> groups;
+      relief_environment(*root_, replaced, groups, warnings_);
       add_files(scene_, replaced.take());
     } catch (const SceneError&) {
     }
@@ -321,6 +322,7 @@ void GltfLoader::place_instance(const PlacedNode& node,
   instance.world_from_object = transform_to_affine(world);
   instance.flags =
       instance_flags(node.object, scene_.materials[static_cast<std::size_t>(instance.material_index)], world);
+  instance.flags |= light_group_of(node) << kLightGroupShift;
   if (node.object.caustic_caster == CausticCaster::kYes) {
     const bool by_material = scene_.materials[static_cast<std::size_t>(instance.material_index)].depends_on_ray;
     if (by_material || node.object.hidden_from != 0) {
@@ -488,6 +490,12 @@ void GltfLoader::place_lamp(const PlacedNode& node, Light& light)
   scene_.lamps.push_back(lamp);
 }
 
+std::uint32_t GltfLoader::light_group_of(const PlacedNode& node)
+{
+  return light_group_number(scene_.light_groups, node.object.light_group, node.document->file,
+                            "/nodes/" + std::to_string(node.node_index) + "/extensions/RELIEF_object");
+}
+
 void GltfLoader::place_lights(const PlacedNode& node)
 {
   const std::string path = "/nodes/" + std::to_string(node.node_index);
@@ -501,6 +509,7 @@ void GltfLoader::place_lights(const PlacedNode& node)
       scene_.lights.insert(scene_.lights.end(), lights.begin(), lights.end());
       scene_.lights.back().casts_caustics = node.object.caustic_light;
       scene_.lights.back().hidden_from = static_cast<std::uint8_t>(node.object.hidden_from);
+      scene_.lights.back().light_group = static_cast<std::uint8_t>(light_group_of(node));
       scene_.lights.back().in_footage = node.object.lights_footage;
       place_lamp(node, scene_.lights.back());
       move_light(node, path, scene_.lights.back());

@@ -76,6 +76,8 @@ class GltfLoader {
   std::vector<std::optional<double>> framed_times(const LoadOptions& options);
   void set_environment(const LoadOptions& options);
   void place(const PlacedNode& node);
+  /// Number of the group of what a node emits; 0: none.
+  std::uint32_t light_group_of(const PlacedNode& node);
   bool is_usable(const PlacedNode& node, const Transform& world, const std::string& path);
   static void check_positions(const PlacedNode& node, const std::string& path, Vec3f extent);
   void place_meshes(const PlacedNode& node);

@@ -1,6 +1,7 @@
 #include "scene/relief_extensions.h"
 
 #include "kernel/graph/graph_scene.h"
+#include "kernel/shape/mesh_view.h"
 #include "kernel/state/path_event.h"
 
 #include <algorithm>
@@ -30,6 +31,15 @@ std::uint32_t read_hidden_from(const JsonReader& r, std::uint32_t inherited = 0)
     if (!r.boolean(name, (inherited & bit) == 0)) hidden |= bit;
   }
   return hidden;
+}
+
+/// The name of a group of lights.
+std::string read_light_group(const JsonReader& r, const std::string& inherited = {})
+{
+  constexpr std::size_t kLongest = 200;  // OpenEXR's channels have names of 255 bytes
+  std::string name = r.string("lightGroup", inherited);
+  if (name.size() > kLongest) r.fail("lightGroup", "a name of at most 200 bytes");
+  return name;
 }
 
 EnvironmentGraph read_environment_graph(const GltfDocument& document,
@@ -382,8 +392,25 @@ Surroundings read_surroundings(const GltfDocument& document,
 
 }  // namespace
 
+std::uint32_t light_group_number(std::vector<std::string>& names,
+                                 const std::string& name,
+                                 const std::string& file,
+                                 const std::string& path)
+{
+  if (name.empty()) return 0;
+  const auto place = std::find(names.begin(), names.end(), name);
+  const auto number = static_cast<std::uint32_t>(place - names.begin()) + 1;
+  if (number > kMostLightGroups) {
+    throw SceneError(file, json_path_join(path, "lightGroup"),
+                     "at most " + std::to_string(kMostLightGroups) + " groups of lights", "more");
+  }
+  if (place == names.end()) names.push_back(name);
+  return number;
+}
+
 std::optional<Environment> relief_environment(const GltfDocument& document,
                                               TextureTable& textures,
+                                              std::vector<std::string>& light_groups,
                                               Warnings& warnings)
 {
   std::optional<Environment> out;
@@ -394,6 +421,7 @@ std::optional<Environment> relief_environment(const GltfDocument& document,
     e.visible_to_camera = r.boolean("visibleToCamera", true);
     e.casts_caustics = r.boolean("causticLight", true);
     e.hidden_from = read_hidden_from(r);
+    e.light_group = light_group_number(light_groups, read_light_group(r), r.file(), r.path());
     if (r.has("volume")) {
       const JsonReader volume = r.object("volume");
       VolumeProgram medium = volume_read(document, volume, textures, warnings);
@@ -562,6 +590,7 @@ ObjectSettings relief_object(const GltfDocument& document, int node_index, Objec
     s.caustic_light = r.boolean("causticLight", s.caustic_light);
     s.holdout = r.boolean("holdout", s.holdout);
     s.shadow_catcher = r.boolean("shadowCatcher", s.shadow_catcher);
+    s.light_group = read_light_group(r, s.light_group);
     s.lights_footage = r.boolean("lightsFootage", s.lights_footage);
     s.hidden_from = read_hidden_from(r, s.hidden_from);
     s.asset = r.string("asset", s.asset);

@@ -24,9 +24,20 @@ void relief_camera(const GltfDocument& document,
                    Shutter& shutter,
                    Warnings& warnings);
 
+/// Number of a group of lights by its name; 0: none.
+/// @param names       those that there are; gets a new one
+/// @param file, path  of the object that names it in its property lightGroup
+/// @error SceneError: there are more than kMostLightGroups
+std::uint32_t light_group_number(std::vector<std::string>& names,
+                                 const std::string& name,
+                                 const std::string& file,
+                                 const std::string& path);
+
 /// RELIEF_environment; empty if the document has none.
+/// @param light_groups  as for light_group_number
 std::optional<Environment> relief_environment(const GltfDocument& document,
                                               TextureTable& textures,
+                                              std::vector<std::string>& light_groups,
                                               Warnings& warnings);
 
 /// Reads RELIEF_light of a punctual light into it.
@@ -59,6 +70,7 @@ struct ObjectSettings {
   bool caustic_light = true;
   bool holdout = false;
   bool shadow_catcher = false;
+  std::string light_group;        ///< empty: none
   bool lights_footage = true;     ///< of lights: see Light::in_footage
   std::uint32_t hidden_from = 0;  ///< as Light::hidden_from
   std::string asset;              ///< empty: none is named

@@ -120,6 +120,7 @@ struct Environment : Surroundings {
   bool visible_to_camera = true;
   bool casts_caustics = true;     ///< as Light::casts_caustics
   std::uint32_t hidden_from = 0;  ///< bit PathEvent, or kHiddenFromScattered: bounced rays that do not see it
+  std::uint32_t light_group = 0;  ///< as Light::light_group
   std::optional<Medium> medium;   ///< that fills all space
   VolumeProgram varying_medium;   ///< see Scene::varying_media
   /// Perceptual: where the camera does not see it, glass up to this roughness is as clear as air. Empty: glass is opaque.
@@ -145,6 +146,7 @@ struct Scene {
   std::vector<GraphProgram> graphs;          ///< by Material::graph_index and so on, and by Lamp::graph_index
   std::vector<std::string> attribute_names;  ///< of attributes that graphs read
   std::vector<InstanceColumn> instance_columns;
+  std::vector<std::string> light_groups;  ///< names by Light::light_group − 1
   std::vector<Light> lights;  ///< everything but mesh triangles and the environment
   /// Transforms at evenly spaced times, from when the shutter opens to when it closes; of lights see LightsView::motions. What
   /// stands where it is when the shutter is half done is everywhere else in this scene.

@@ -143,6 +143,10 @@ def enabled_passes(scene, view_layer):
     passes = [p for p in PASSES if p.is_enabled(view_layer)]
     if denoiser_of(scene, view_layer) != "none":
         passes += _DENOISED
+    for group in view_layer.lightgroups:
+        passes.append(
+            Pass(f"Combined_{group.name}", "", True, "light_groups", _rgb(f"light_group_{group.name}"), "RGB", "COLOR")
+        )
     for kind in CRYPTOMATTES:
         setting = f"use_pass_cryptomatte_{kind}"
         if not getattr(view_layer, setting):
@@ -166,9 +170,8 @@ def warn_missing_passes(view_layer, warnings):
             is_pass = setting.startswith("use_pass_") or setting.startswith("pass_debug_")
             if is_pass and setting not in _NO_PASSES and (owner, setting) not in known and getattr(holder, setting) is True:
                 warnings.warn(where, f'the pass "{rna.name}"', "it is left empty")
-    for text, name in (("shader AOV", "aovs"), ("light group", "lightgroups")):
-        for item in getattr(view_layer, name, ()):
-            warnings.warn(where, f'the {text} "{item.name}"', "it has no pass")
+    for item in view_layer.aovs:
+        warnings.warn(where, f'the shader AOV "{item.name}"', "it has no pass")
 
 
 def aov_list(passes, has_holdouts=False):

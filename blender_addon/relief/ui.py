@@ -8,6 +8,7 @@ import sys
 import textwrap
 
 import bpy
+from bl_ui.properties_view_layer import ViewLayerLightgroupsPanel
 
 from . import compat
 from .export.displacement import needs_switch
@@ -342,6 +343,14 @@ class RELIEF_PT_performance(_RenderPanel, bpy.types.Panel):
         rows.prop(settings, "strict")
 
 
+def _draw_light_group(rows, owner, view_layer):
+    row = rows.row(align=True)
+    row.prop_search(owner, "lightgroup", view_layer, "lightgroups", text="Light Group", results_are_suggestions=True)
+    add = row.column(align=True)
+    add.enabled = bool(owner.lightgroup) and owner.lightgroup not in {group.name for group in view_layer.lightgroups}
+    add.operator("scene.view_layer_add_lightgroup", icon="ADD", text="").name = owner.lightgroup
+
+
 class _LayerPanel(_Panel):
     bl_context = "view_layer"
 
@@ -397,6 +406,11 @@ class RELIEF_PT_passes(_LayerPanel, bpy.types.Panel):
         for name in layer.relief.bl_rna.properties.keys():
             if name.startswith("use_pass_"):
                 rows.prop(layer.relief, name)
+
+
+class RELIEF_PT_light_groups(_LayerPanel, ViewLayerLightgroupsPanel):
+    bl_label = "Light Groups"
+    bl_parent_id = "RELIEF_PT_passes"
 
 
 class RELIEF_PT_material_surface(_MaterialPanel, bpy.types.Panel):
@@ -503,6 +517,15 @@ class RELIEF_PT_world_ray_visibility(_WorldPanel, bpy.types.Panel):
         rows = self.rows()
         for ray in ("camera", "diffuse", "glossy", "transmission", "volume_scatter"):
             rows.prop(*compat.world_visibility(context.world, ray))
+
+
+class RELIEF_PT_world_light_group(_WorldPanel, bpy.types.Panel):
+    bl_label = "Light Group"
+    bl_context = "world"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        _draw_light_group(self.rows(), context.world, context.view_layer)
 
 
 class RELIEF_PT_world_mist(_WorldPanel, bpy.types.Panel):
@@ -624,6 +647,14 @@ class RELIEF_PT_object_caustics(_SeenObjectPanel, bpy.types.Panel):
         rows.prop(settings, "caustic_light")
 
 
+class RELIEF_PT_object_light_group(_SeenObjectPanel, bpy.types.Panel):
+    bl_label = "Light Group"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        _draw_light_group(self.rows(), context.object, context.view_layer)
+
+
 class RELIEF_PT_camera_panorama(_CameraPanel, bpy.types.Panel):
     bl_label = "Panorama"
     bl_context = "data"
@@ -680,6 +711,7 @@ _classes = (
     RELIEF_PT_filter,
     RELIEF_PT_override,
     RELIEF_PT_passes,
+    RELIEF_PT_light_groups,
     RELIEF_PT_material_surface,
     RELIEF_PT_material_volume,
     RELIEF_PT_material_displacement,
@@ -687,6 +719,7 @@ _classes = (
     RELIEF_PT_world_preview,
     RELIEF_PT_world,
     RELIEF_PT_world_volume,
+    RELIEF_PT_world_light_group,
     RELIEF_PT_world_mist,
     RELIEF_PT_world_ray_visibility,
     RELIEF_PT_light,
@@ -694,6 +727,7 @@ _classes = (
     RELIEF_PT_object_motion_blur,
     RELIEF_PT_object_ray_visibility,
     RELIEF_PT_object_caustics,
+    RELIEF_PT_object_light_group,
     RELIEF_PT_camera_panorama,
     RELIEF_PT_camera_dof,
     *map(_in_node_editor, (RELIEF_PT_light, RELIEF_PT_material_settings, RELIEF_PT_world_ray_visibility)),

@@ -20,7 +20,7 @@ struct AccumulatorLayout {
   int direct = -1, albedo = -1, normal = -1, depth = -1, position = -1, uv = -1, object_id = -1, material_id = -1,
       displacement_steps = -1, caustic = -1, holdout = -1, mist = -1, emission = -1, environment = -1,
       ambient_occlusion = -1, clear = -1, denoising_albedo = -1, denoising_normal = -1, denoising_depth = -1,
-      denoising_half = -1, volume_direct = -1, volume_indirect = -1;
+      denoising_half = -1, volume_direct = -1, volume_indirect = -1, light_groups = -1;
   int light_passes[kNumLightPasses] = {-1, -1, -1, -1, -1, -1};
   int event_colors[kNumEventKinds] = {-1, -1, -1};
   int catcher = -1;             ///< CatcherSums: where something is a shadow catcher
@@ -136,6 +136,17 @@ RELIEF_KERNEL void film_add_emission(const FilmAccumulatorView& film, std::uint3
 RELIEF_KERNEL void film_add_environment(const FilmAccumulatorView& film, std::uint32_t pixel, Vec3f radiance)
 {
   if (film.layout.environment >= 0) film_add3(film_record(film, pixel) + film.layout.environment, radiance);
+}
+
+/// Adds light of a group of lights, if that is kept.
+/// @param group  0: none
+RELIEF_KERNEL void film_add_light_group(const FilmAccumulatorView& film,
+                                        std::uint32_t pixel,
+                                        std::uint32_t group,
+                                        Vec3f radiance)
+{
+  if (film.layout.light_groups < 0 || group == 0 || !is_finite(radiance)) return;
+  film_add3(film_record(film, pixel) + film.layout.light_groups + 3 * (group - 1), radiance);
 }
 
 /// Adds what media scattered to the camera of a sample, where that is kept.

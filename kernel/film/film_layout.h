@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 #include <string_view>
 
 namespace relief {
@@ -36,6 +37,7 @@ enum class Aov : std::uint8_t {
   kDenoisingHalf,
   kVolumeDirect,
   kVolumeIndirect,
+  kLightGroups,
   kDiffuseDirect,
   kDiffuseIndirect,
   kDiffuseColor,
@@ -49,7 +51,7 @@ enum class Aov : std::uint8_t {
   kCryptoMaterial,
   kCryptoAsset,
 };
-inline constexpr int kNumAovs = 39;
+inline constexpr int kNumAovs = 40;
 
 /// Sets of AOVs: bit i is enumerator i.
 using AovMask = std::uint64_t;
@@ -129,6 +131,8 @@ inline constexpr std::array<AovInfo, kNumAovs> kAovInfo = {{
      "light that media scatter to the camera, straight from its source"},
     {Aov::kVolumeIndirect, "volume_indirect", "RGB", false,
      "light that media scatter to the camera after other scattering events"},
+    {Aov::kLightGroups, "light_groups", "RGB", false,
+     "light of the scene's groups of lights, a layer each: light_group_NAME"},
     {Aov::kDiffuseDirect, "diffuse_direct", "RGB", false,
      "light that what the camera sees scatters diffusely, straight from its source"},
     {Aov::kDiffuseIndirect, "diffuse_indirect", "RGB", false, "the same, after other scattering events"},
@@ -151,14 +155,17 @@ struct FilmLayout {
   std::array<std::int16_t, kNumAovs> offset{};
   int num_floats = 0;  ///< per pixel
   int cryptomatte_levels = 0;
+  int num_light_groups = 0;
 };
 
 /// Channels of one Cryptomatte: pairs of an id and its coverage, two pairs to a layer of four channels.
 constexpr int cryptomatte_num_channels(int levels) { return (levels + 1) / 2 * 4; }
 
-constexpr int aov_num_channels(const AovInfo& info, int cryptomatte_levels)
+constexpr int aov_num_channels(const AovInfo& info, const FilmLayout& layout)
 {
-  return info.channels.empty() ? cryptomatte_num_channels(cryptomatte_levels) : static_cast<int>(info.channels.size());
+  if (info.channels.empty()) return cryptomatte_num_channels(layout.cryptomatte_levels);
+  const int num_layers = info.aov == Aov::kLightGroups ? layout.num_light_groups : 1;
+  return static_cast<int>(info.channels.size()) * num_layers;
 }
 
 /// The finished picture: plain floats, row 0 on top, averaged and normalized (no sums), owned elsewhere.
@@ -168,18 +175,20 @@ struct FilmView {
   int crop_x = 0, crop_y = 0;     ///< where the window lies in the full image
   int full_width = 0, full_height = 0;
   FilmLayout layout;
+  const std::string* light_groups = nullptr;  ///< names of layout.num_light_groups
 };
 
 /// Layout that keeps the AOVs of a set, in enumerator order.
 /// @param cryptomatte_levels  1 … kMostCryptomatteLevels
-inline FilmLayout film_layout_make(AovMask aov_mask, int cryptomatte_levels = 6)
+inline FilmLayout film_layout_make(AovMask aov_mask, int cryptomatte_levels = 6, int num_light_groups = 0)
 {
   FilmLayout layout;
   layout.cryptomatte_levels = cryptomatte_levels;
+  layout.num_light_groups = num_light_groups;
   for (int i = 0; i < kNumAovs; ++i) {
     const bool kept = aov_is_in(static_cast<Aov>(i), aov_mask);
     layout.offset[static_cast<std::size_t>(i)] = static_cast<std::int16_t>(kept ? layout.num_floats : -1);
-    if (kept) layout.num_floats += aov_num_channels(kAovInfo[static_cast<std::size_t>(i)], cryptomatte_levels);
+    if (kept) layout.num_floats += aov_num_channels(kAovInfo[static_cast<std::size_t>(i)], layout);
   }
   return layout;
 }

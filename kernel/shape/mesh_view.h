@@ -89,6 +89,11 @@ enum InstanceFlag : std::uint32_t {
 
 inline constexpr std::uint32_t kHiddenFrom = 0xfu << kHiddenFromShift;
 
+/// Groups of lights at most; an instance's flags have the number of that of what it emits, 0 for none.
+inline constexpr std::uint32_t kMostLightGroups = 31;
+inline constexpr int kLightGroupShift = 21;
+inline constexpr std::uint32_t kLightGroup = kMostLightGroups << kLightGroupShift;
+
 /// In place of an instance's number: what is placed so is none, but a lamp or the world.
 inline constexpr std::uint32_t kNoInstance = ~0u;
 

@@ -25,7 +25,9 @@ RELIEF_KERNEL void accumulate_shadow(const KernelGlobals& g,
     MediumState& m = state.media[path];
     m.lit = m.lit + radiance_clamped(gain, g.clamp_direct);
   }
+  constexpr int kShift = kShadowLightGroupShift;
   path_add_radiance(g, state, path, static_cast<int>(scatterings & kShadowScatterings), gain,
+                    scatterings >> kShift & kMostLightGroups,
                     (scatterings & kMediumRay) != 0 ? LightRoad::kAskedInMedium : LightRoad::kAsked);
 }
 

@@ -92,11 +92,16 @@ RELIEF_KERNEL void shadow_queue_push(ShadowQueue& shadow,
 
 /// What a shadow ray is told of its path, which may go on before the ray is traced: ShadowQueue::scatterings.
 /// @param scatterings  events between the camera and the light
-RELIEF_KERNEL std::uint32_t path_shadow_scatterings(const PathState& s, std::uint32_t i, int scatterings)
+/// @param light_group  of the light
+RELIEF_KERNEL std::uint32_t path_shadow_scatterings(const PathState& s,
+                                                    std::uint32_t i,
+                                                    int scatterings,
+                                                    std::uint32_t light_group)
 {
   constexpr std::uint32_t kMost = (kMediumRay >> kShadowTransparentShift) - 1u;
   const std::uint32_t passed = s.flags[i] >> kPathTransparentShift;
-  return static_cast<std::uint32_t>(scatterings) | (passed < kMost ? passed : kMost) << kShadowTransparentShift;
+  return static_cast<std::uint32_t>(scatterings) | light_group << kShadowLightGroupShift |
+         (passed < kMost ? passed : kMost) << kShadowTransparentShift;
 }
 
 /// Transparent surfaces before a shadow ray.
@@ -194,11 +199,13 @@ enum class LightRoad : std::uint8_t { kFound, kAsked, kAskedInMedium };
 /// at most one event, indirect after more.
 /// @param scatterings   events between the camera and the emitter
 /// @param contribution  to the picture, W/m²/sr
+/// @param light_group   of the light that it comes from; 0: none
 RELIEF_KERNEL void path_add_radiance(const KernelGlobals& g,
                                      PathState& s,
                                      std::uint32_t i,
                                      int scatterings,
                                      Vec3f contribution,
+                                     std::uint32_t light_group,
                                      LightRoad road = LightRoad::kFound)
 {
   const bool is_direct = scatterings <= 1;
@@ -206,6 +213,14 @@ RELIEF_KERNEL void path_add_radiance(const KernelGlobals& g,
   PathColumn<Vec3f>& sum = is_direct ? s.direct : s.indirect;
   sum[i] = sum[i] + light;
   if (__builtin_expect(s.light_passes != nullptr, 0)) path_add_by_event(s, i, scatterings, light, road);
+  film_add_light_group(g.film, s.pixel[i], light_group, light);
+}
+
+/// Group of the light that has been asked.
+/// @param emitter  null: the environment
+RELIEF_KERNEL std::uint32_t asked_light_group(const KernelGlobals& g, const Light* emitter)
+{
+  return emitter != nullptr ? emitter->light_group : g.environment_light_group;
 }
 
 /// Adds light to the albedo that a denoiser is told of, where it is seen by the camera or in mirrors alone.

@@ -28,7 +28,7 @@ RELIEF_KERNEL void shade_sun_disks(const KernelGlobals& g, PathState& state, std
                                                        lights_sun_pdf(g.lights, path_origin(state, path),
                                                                       path_scattered_at(state, path), index))
                                     : 1.0f;
-    path_add_radiance(g, state, path, scatterings, seen * weight);
+    path_add_radiance(g, state, path, scatterings, seen * weight, sun.light_group);
   }
 }
 
@@ -67,7 +67,7 @@ RELIEF_KERNEL void shade_background(const KernelGlobals& g, PathState& state, st
         lights_environment_pdf(g.lights, path_origin(state, path), path_scattered_at(state, path), D);
     radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
   }
-  path_add_radiance(g, state, path, scatterings, path_throughput(state, path) * radiance);
+  path_add_radiance(g, state, path, scatterings, path_throughput(state, path) * radiance, g.environment_light_group);
 }
 
 }  // namespace relief

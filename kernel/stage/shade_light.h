@@ -38,7 +38,7 @@ RELIEF_KERNEL void shade_light(const KernelGlobals& g, PathState& state, std::ui
           lights_pdf(g.lights, path_origin(state, path), path_scattered_at(state, path), {light_index}, D, t, time);
       radiance *= path_bsdf_weight(g.light_technique, pdf, pdf_light);
     }
-    path_add_radiance(g, state, path, scatterings, path_throughput(state, path) * radiance);
+    path_add_radiance(g, state, path, scatterings, path_throughput(state, path) * radiance, light.light_group);
   }
   state.t_min[path] = t_min_behind(t);
 }

@@ -111,7 +111,8 @@ RELIEF_KERNEL void shade_medium_light_at(const KernelGlobals& g,
       ray_cone_propagate({state.cone_width[path], state.cone_spread[path]}, state.t_min[path] + place.distance);
   const int bounces = path_bounces(state.bounces[path], BounceKind::kAll);
   shadow_queue_push(shadow, path, P, D, t_max, cone, gain,
-                    path_shadow_scatterings(state, path, bounces + 1) | (bounces == 0 ? kMediumRay : 0u));
+                    path_shadow_scatterings(state, path, bounces + 1, asked_light_group(g, answer.emitter)) |
+                        (bounces == 0 ? kMediumRay : 0u));
 }
 
 /// Asks the environment, from a place on a stretch, for what a path that is scattered there finds of it.
@@ -138,7 +139,8 @@ RELIEF_KERNEL void shade_medium_sky_at(const KernelGlobals& g,
   if (is_zero(gain)) return;
   const RayCone cone =
       ray_cone_propagate({state.cone_width[path], state.cone_spread[path]}, state.t_min[path] + place.distance);
-  shadow_queue_push(shadow, path, P, wi, kInfinity, cone, gain, path_shadow_scatterings(state, path, 1) | kMediumRay);
+  shadow_queue_push(shadow, path, P, wi, kInfinity, cone, gain,
+                    path_shadow_scatterings(state, path, 1, g.environment_light_group) | kMediumRay);
 }
 
 /// Below this share of the light the environment is left to paths, and above the other one it is always asked for.
@@ -304,7 +306,7 @@ RELIEF_KERNEL void shade_medium_emission(const KernelGlobals& g, PathState& stat
   const int bounce = path_bounces(state.bounces[path], BounceKind::kAll);
   if (bounce == 0) film_add_emission(g.film, state.pixel[path], emitted);
   path_add_denoising(g, state, path, emitted);
-  path_add_radiance(g, state, path, bounce, emitted);
+  path_add_radiance(g, state, path, bounce, emitted, 0);
 }
 
 /// One of several places, each kept as likely as by what it carries.

@@ -48,7 +48,8 @@ RELIEF_KERNEL void shade_surface_emission(const KernelGlobals& g,
       radiance *= path_bsdf_weight(g.light_technique, pdf, shade_surface_light_pdf(g, state, path, at));
     }
     if (bounce == 0) film_add_emission(g.film, state.pixel[path], throughput * radiance);
-    path_add_radiance(g, state, path, bounce, throughput * radiance);
+    path_add_radiance(g, state, path, bounce, throughput * radiance,
+                      (at.instance->flags & kLightGroup) >> kLightGroupShift);
   }
 }
 

@@ -80,7 +80,8 @@ RELIEF_KERNEL void shade_surface_lit(const KernelGlobals& g,
   Vec3f D;
   float t_max = 0;
   shadow_ray_aim(light, emitter, P, O, D, t_max);
-  shadow_queue_push(shadow, path, O, D, t_max, event.cone, gain, path_shadow_scatterings(state, path, bounce + 1));
+  shadow_queue_push(shadow, path, O, D, t_max, event.cone, gain,
+                    path_shadow_scatterings(state, path, bounce + 1, asked_light_group(g, emitter)));
 }
 
 /// Asks a light, and queues a shadow ray towards it.

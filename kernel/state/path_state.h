@@ -140,9 +140,10 @@ inline constexpr std::uint32_t kShadowEntries = 2 * kBatchPaths + 64 / 4;
 
 /// In place of `scatterings`: a ray that looks for ambient occlusion.
 inline constexpr std::uint32_t kAmbientRay = ~0u;
-/// Within `scatterings`: the number of events, above it that of transparent surfaces that the path had passed, and whether the first
-/// event is in a medium.
-inline constexpr std::uint32_t kShadowScatterings = 0xffffu;
+/// Within `scatterings`: the number of events, above it that of the light's group, of transparent surfaces that the path had passed,
+/// and whether the first event is in a medium.
+inline constexpr std::uint32_t kShadowScatterings = 0x3ffu;
+inline constexpr int kShadowLightGroupShift = 10;
 inline constexpr int kShadowTransparentShift = 16;
 inline constexpr std::uint32_t kMediumRay = 1u << 31;
 

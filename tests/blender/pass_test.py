@@ -279,11 +279,6 @@ def test_passes_that_are_not_there_are_warned_about():
         layer.use_pass_shadow = False
     layer.aovs.add().name = "mask"
     assert_warns(scene, 'shader AOV "mask"')
-    layer = scene.view_layers.new("second")
-    scene.view_layers.remove(scene.view_layers[0])
-    bpy.context.window.view_layer = layer
-    bpy.ops.scene.view_layer_add_lightgroup(name="key")
-    assert_warns(scene, 'light group "key"')
 
 
 def test_direct_and_indirect_make_the_whole():

@@ -21,8 +21,6 @@ _MISSING = {
     "*: CyclesCurveRenderSettings.*subdivisions": "ribbons are as smooth as they are traced",
     "render: RenderSettings.hair_*": "of other engines",
     "render: operator *hair*": "of other engines",
-    "*: *light*group*": "no light groups; a warning tells",
-    "*: menu VIEWLAYER_MT_lightgroup_sync": "no light groups",
     "object: ObjectLightLinking.*": "no light linking; a warning tells",
     "object: operator object.light_linking*": "no light linking",
     "object: menu *LIGHT_LINKING*": "no light linking",

@@ -45,8 +45,8 @@ TEST_F(ExrTest, FloatsAndIdsComeBackExactlyThroughEveryLosslessCompression)
     EXPECT_FALSE(picture.lossy);
     for (const AovInfo& info : kAovInfo) {
       for (std::size_t c = 0; c < info.channels.size(); ++c) {
-        const Channel* channel = picture.find(channel_name(info, c));
-        ASSERT_NE(channel, nullptr) << channel_name(info, c);
+        const Channel* channel = picture.find(channel_name(info, c, film.view.light_groups));
+        ASSERT_NE(channel, nullptr) << channel_name(info, c, film.view.light_groups);
         EXPECT_EQ(channel->type, info.integer_like ? ChannelType::kUint : ChannelType::kFloat);
         for (int y = 0; y < 301; ++y) {
           for (int x = 0; x < 37; ++x) {
@@ -132,7 +132,7 @@ TEST_F(ExrTest, ColoursOfAcescgHaveItsPrimariesInTheFileAndRec709InMemory)
   const Picture picture = exr_load(file("a.exr"));
   for (const AovInfo& info : kAovInfo) {
     for (std::size_t c = 0; c < info.channels.size(); ++c) {
-      const std::string name = channel_name(info, c);
+      const std::string name = channel_name(info, c, film.view.light_groups);
       const bool is_color = color_component(name).has_value();
       for (int y = 0; y < 300; ++y) {
         for (int x = 0; x < 21; ++x) {
@@ -151,7 +151,7 @@ TEST_F(ExrTest, ColoursOfAcescgHaveItsPrimariesInTheFileAndRec709InMemory)
 
 TEST(ColorSpace, OnlyColoursAreConverted)
 {
-  for (const char* name : {"R", "G", "B", "albedo.R", "denoised.G", "caustic.B", "direct.R"}) {
+  for (const char* name : {"R", "G", "B", "albedo.R", "denoised.G", "caustic.B", "direct.R", "light_group_a.b.R"}) {
     EXPECT_TRUE(color_component(name)) << name;
   }
   for (const char* name : {"A", "variance.R", "half.G", "denoised_error.B", "denoising_half.R", "normal.X", "depth.Z",

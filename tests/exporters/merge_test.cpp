@@ -79,7 +79,7 @@ TEST_F(Merge, EqualsTheSampleWeightedMeansInDoublePrecision)
   EXPECT_TRUE(result.warnings.empty());
   for (const AovInfo& info : kAovInfo) {
     for (std::size_t c = 0; c < info.channels.size(); ++c) {
-      const Channel* merged = result.picture.find(channel_name(info, c));
+      const Channel* merged = result.picture.find(channel_name(info, c, films[0].view.light_groups));
       ASSERT_NE(merged, nullptr);
       for (std::size_t i = 0; i < kWidth * kHeight; ++i) {
         double sum = 0, weights = 0, first = 0, num_samples = 0;

@@ -63,14 +63,16 @@ struct TestFilm {
   {
     view.width = view.full_width = width;
     view.height = view.full_height = height;
-    view.layout = film_layout_make(aov_mask);
+    static const std::string kLightGroups[] = {"key"};
+    view.layout = film_layout_make(aov_mask, 6, 1);
+    view.light_groups = kLightGroups;
     std::mt19937 random(seed);
     std::uniform_real_distribution<float> uniform(0.f, 2.f);
     std::uniform_int_distribution<int> integer(1, 70000);
     for (int i = 0; i < width * height; ++i) {
       for (const AovInfo& info : kAovInfo) {
         if (view.layout.offset[static_cast<std::size_t>(info.aov)] < 0) continue;
-        for (int c = 0; c < aov_num_channels(info, view.layout.cryptomatte_levels); ++c) {
+        for (int c = 0; c < aov_num_channels(info, view.layout); ++c) {
           pixels.push_back(info.integer_like ? static_cast<float>(integer(random)) : uniform(random));
         }
       }

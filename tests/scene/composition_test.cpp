@@ -192,6 +192,43 @@ TEST(Composition, ShadowCatchersAreInheritedAndNoNumbers)
   }
 }
 
+TEST(Composition, LightGroupsAreNumberedAsTheyAreMet)
+{
+  GltfBuilder b = test::square_scene();
+  const auto in_group = [](const json& name) { return json{{"RELIEF_object", {{"lightGroup", name}}}}; };
+  b.json["nodes"] = {{{"children", {1, 2}}, {"extensions", in_group("a")}},
+                     {{"mesh", 0}},
+                     {{"mesh", 0}, {"extensions", in_group("b")}},
+                     {{"mesh", 0}, {"extensions", in_group("")}}};
+  b.json["scenes"][0]["nodes"] = {0, 3};
+  b.json["extensions"]["RELIEF_environment"] = {{"color", {1, 1, 1}}, {"lightGroup", "b"}};
+  const Scene scene = load(b);
+  EXPECT_EQ(scene.light_groups, (std::vector<std::string>{"a", "b"}));
+  ASSERT_EQ(scene.instances.size(), 3u);
+  for (std::uint32_t i = 0; i < 3; ++i) {
+    EXPECT_EQ((scene.instances[i].flags & kLightGroup) >> kLightGroupShift, (i + 1) % 3);
+  }
+  EXPECT_EQ(scene.environment.light_group, 2u);
+
+  const auto error_of = [&] {
+    try {
+      load(b);
+    } catch (const SceneError& e) {
+      return e.json_path + ": " + e.expected;
+    }
+    return std::string("no error");
+  };
+  for (int i = 0; i < 30; ++i) {
+    b.json["nodes"].push_back({{"mesh", 0}, {"extensions", in_group(std::to_string(i))}});
+    b.json["scenes"][0]["nodes"].push_back(4 + i);
+  }
+  EXPECT_EQ(error_of(), "/nodes/33/extensions/RELIEF_object/lightGroup: at most 31 groups of lights");
+  b.json["nodes"][0]["extensions"] = in_group(std::string(201, 'x'));
+  EXPECT_EQ(error_of(), "/nodes/0/extensions/RELIEF_object/lightGroup: a name of at most 200 bytes");
+  b.json["nodes"][0]["extensions"] = in_group(3);
+  EXPECT_EQ(error_of(), "/nodes/0/extensions/RELIEF_object/lightGroup: a string");
+}
+
 // --- EXT_mesh_gpu_instancing ---
 
 TEST(Instancing, PlacesCopiesInTheNodesSpace)

@@ -203,6 +203,7 @@ class SceneExporter:
         self._report = report
         self._motion = motion
         self._stored = stored if stored is not None else StoredMeshes()
+        self._light_groups = {group.name for group in depsgraph.view_layer.lightgroups}
         self._by_shape = {}
         self._images = ImageExporter(self.writer, self._scene)
         view_layer = (depsgraph.view_layer, depsgraph.scene)
@@ -234,7 +235,7 @@ class SceneExporter:
         world = compat.world_of(self._scene, layer) if layer.use_sky else None
         clear_roughness = compat.clear_roughness(self._scene)
         eye = Eye.of(view.camera, view.matrix, view.size)
-        export_world(world, is_opaque, clear_roughness, eye, self.writer, self._images, self._report)
+        export_world(world, is_opaque, clear_roughness, self._light_groups, eye, self.writer, self._images, self._report)
 
     def add_objects(self):
         """Adds meshes, instances and lights."""
@@ -368,6 +369,8 @@ class SceneExporter:
             settings["holdout"] = True
         if thing.is_catcher:
             settings["shadowCatcher"] = True
+        if original.lightgroup in self._light_groups:
+            settings["lightGroup"] = original.lightgroup
         if self._depsgraph.view_layer.use_pass_cryptomatte_asset:
             settings["asset"] = _asset_name(original)
         if not original.visible_shadow:
@@ -517,6 +520,8 @@ class SceneExporter:
                 settings["causticLight"] = False
             if not thing.is_catcher:
                 settings["lightsFootage"] = False
+            if original.lightgroup in self._light_groups:
+                settings["lightGroup"] = original.lightgroup
             if settings:
                 self.writer.extend(node, "RELIEF_object", settings)
             self.nodes.append(node)

@@ -47,12 +47,13 @@ class Eye:
         return cls(np.stack([right, up, -back]), half_window, tuple(extension["shift"]))
 
 
-def export_world(world, visible_to_camera, clear_roughness, eye, writer, images, report):
+def export_world(world, visible_to_camera, clear_roughness, light_groups, eye, writer, images, report):
     """Adds the surroundings. Without a world, or with a black one, there is none.
 
     @param  world              bpy world or None
     @param  visible_to_camera  False: films with a transparent background
     @param  clear_roughness    up to which glass is as clear as air then; None: it is opaque
+    @param  light_groups       names of those that have passes
     @param  eye                Eye or None
     @param  writer             GltfWriter
     @param  images             ImageExporter
@@ -70,6 +71,8 @@ def export_world(world, visible_to_camera, clear_roughness, eye, writer, images,
         environment.update(hidden_settings(lambda ray: compat.sees_world(world, ray)))
         if not world.relief.caustic_light:
             environment["causticLight"] = False
+        if world.lightgroup in light_groups:
+            environment["lightGroup"] = world.lightgroup
     writer.extend(writer.json, "RELIEF_environment", environment)
 
 
