@@ -93,13 +93,18 @@ RELIEF_KERNEL float curve_radius(const MeshView& mesh, const InstanceView& insta
   hit.P_error = gamma_bound(8) * (size + abs(m.p) + abs_transform(m, abs_transform(inverse, size) + abs(inverse.p)));
   Vec3f away;  // unit, from the curve
   if ((instance.flags & kRibbons) != 0) {
-    const Vec3f tangent = curve_tangent(mesh, instance, segment, u, wo);
-    const Vec3f across = cross(tangent, wo);
+    // Embree's ribbon faces the ray in object space, and is v wide there. Its sides go through an uneven scale as normals.
+    const Vec3f along = curve_basis_derivative(u).of(P);
+    const Vec3f across = cross(along, transform_vector(inverse, wo));
     const float sine = length(across);
-    const Vec3f side = sine > 0.0f ? across / sine : frame_from_normal(tangent).s;
-    away = cross(side, tangent);
+    const Vec3f side = sine > 0.0f ? across / sine : frame_from_normal(wo).s;
+    const Vec3f facing = cross(side, along);
+    const float width = length(facing);
+    const Vec3f above = width > 0.0f ? facing / width : cross(side, wo);
+    const auto to_world = [&](Vec3f n) { return normalize(transform_normal(inverse, as_normal(n))); };
+    away = to_world(above);
     hit.Ng = wo;
-    hit.Ns = normalize(v * side + safe_sqrt(1.0f - v * v) * away);
+    hit.Ns = to_world(v * side + safe_sqrt(1.0f - v * v) * above);
   } else {
     const Vec3f out = transform_point(inverse, P_ray) - centre;
     away = hit.Ng = hit.Ns = is_zero(out) ? wo : normalize(transform_normal(inverse, as_normal(out)));

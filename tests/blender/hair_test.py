@@ -61,6 +61,15 @@ def test_ribbons():
     assert_agrees(scene, samples=16)
 
 
+def test_strands_under_an_uneven_scale():
+    """They become elliptic, and ribbons' normals go through the scale: blocks were up to 11 % dark, the mean 1.2 %."""
+    for shape in ("THICK", "RIBBONS"):
+        scene = _stage()
+        ball = _grow(diffuse((0.7, 0.4, 0.2)), shape=shape, count=150, radius_scale=0.05)
+        ball.scale, ball.rotation_euler = (1.6, 0.5, 0.9), degrees(0, 0, 25)
+        assert_agrees(scene, samples=32, tolerance=_TUBES)
+
+
 def test_no_width():
     """Strands without a width are not seen, and not asked for point by point; one end is width enough."""
     from relief.export import hair
