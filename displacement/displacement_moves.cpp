@@ -14,6 +14,10 @@ namespace {
 /// 320 × 180 pixels 294 processor seconds instead of 7, cracks on 200 × 200 at 1280 × 720, of six cells, 78 instead of 9).
 constexpr double kMostMovedCells = 16;
 
+/// Of maps, pixels: between vertices so close a ray finds no more than the picture can show, and takes five times as long to find
+/// it. Whoever divides a mesh so finely has it displaced at its vertices by every other renderer.
+constexpr double kMostMovedPixels = 2;
+
 /// Sides of divided triangles, cells at most: lattices have powers of two, so they are one to two cells long. Of one cell and less
 /// there would be four times as many.
 constexpr double kDividedCells = 2;
@@ -21,11 +25,17 @@ constexpr double kDividedCells = 2;
 /// A mesh of fewer triangles was not divided to be displaced: however small it is now, the camera may come near.
 constexpr std::uint32_t kLeastMovedTriangles = 64;
 
+/// Whether a mesh may have been divided to be displaced.
+bool is_divided(const DisplacementSettings& settings, const MeshView& mesh)
+{
+  return !settings.divide && mesh.num_triangles >= kLeastMovedTriangles;
+}
+
 /// Whether a mesh's own vertices are moved.
 /// @param cells  along a side of its triangles in the mean
 bool is_dense(const DisplacementSettings& settings, const MeshView& mesh, double cells)
 {
-  return !settings.divide && mesh.num_triangles >= kLeastMovedTriangles && cells <= kMostMovedCells;
+  return is_divided(settings, mesh) && cells <= kMostMovedCells;
 }
 
 bool has_one_height(const HeightMapView& map)
@@ -58,7 +68,8 @@ VertexMove DisplacementSet::vertex_move_of(const Use& use,
     reasons_.push_back(of + "its vertices are moved, as its heights are all the same");
     return VertexMove::kOwn;
   }
-  if (use.heights == nullptr || use.heights->num_cells > 0) return VertexMove::kNone;
+  if (use.heights == nullptr) return map_move_of(use, options);
+  if (use.heights->num_cells > 0) return VertexMove::kNone;
   const double cells = mean_cells_a_side(use.mesh, use.heights->cells);
   VertexMove move = is_dense(use.settings, use.mesh, cells) ? VertexMove::kOwn : VertexMove::kDivided;
   VertexMove* before = nullptr;
@@ -96,6 +107,33 @@ VertexMove DisplacementSet::vertex_move_of(const Use& use,
   }
   if (before != nullptr) *before = move;
   return move;
+}
+
+VertexMove DisplacementSet::map_move_of(const Use& use, const DisplacementOptions& options)
+{
+  if (!options.camera || options.picture_height <= 0 || lod_of(use.settings, options) > 0 ||
+      !is_divided(use.settings, use.mesh)) {
+    return VertexMove::kNone;
+  }
+  VertexMove* chosen = nullptr;
+  if (options.choices != nullptr) {
+    const auto [known, is_new] =
+        options.choices->moved.try_emplace({use.mesh_name, use.displacement_index, use.mesh.num_triangles, use.scale,
+                                            options.error, 0, options.picture_height, 0},
+                                           VertexMove::kNone);
+    chosen = &known->second;
+    if (!is_new && *chosen == VertexMove::kNone) return VertexMove::kNone;
+  }
+  const SeenInstances seen(use.mesh, picture_view(use, options), use.places, SeenInstances::Coarser::kOutside);
+  const double pixels = mean_pixels_a_side(use.mesh, seen) / static_cast<double>(use.settings.cell_pixels);
+  const bool was_moved = chosen != nullptr && *chosen == VertexMove::kOwn;
+  if (!was_moved && !(pixels <= (options.error > 0 ? options.error : kMostMovedPixels))) return VertexMove::kNone;
+  if (chosen != nullptr) *chosen = VertexMove::kOwn;
+  char text[96];
+  std::snprintf(text, sizeof text, "its vertices are moved, as its triangles are %.2g pixels wide in the picture",
+                pixels);
+  reasons_.push_back("mesh '" + use.mesh_name + "': " + text);
+  return VertexMove::kOwn;
 }
 
 bool DisplacementSet::fits_in_tiles(const Use& use,

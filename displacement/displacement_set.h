@@ -230,6 +230,7 @@ class DisplacementSet {
                             std::vector<LatticeTriangle>* parts,
                             std::uint64_t* used_bytes);
   /// The same for vectors: where even tiles have no room, or the mesh deforms, triangles are larger.
+  VertexMove map_move_of(const Use& use, const DisplacementOptions& options);
   VertexMove vector_move_of(const Use& use,
                             const DisplacementOptions& options,
                             std::vector<LatticeTriangle>* parts,

@@ -110,6 +110,19 @@ void divide(std::int32_t n, std::uint32_t first, TriangleIndices* triangles)
   }
 }
 
+/// Calls a function with the vertices of some thousands of a mesh's triangles.
+template <typename F>
+void for_some_triangles(const MeshView& mesh, F&& f)
+{
+  constexpr std::uint32_t kLooked = 4096;
+  const std::uint32_t step = std::max(mesh.num_triangles / kLooked, 1u);
+  for (std::uint32_t triangle = 0; triangle < mesh.num_triangles; triangle += step) {
+    const TriangleIndices& t = mesh.triangles[triangle];
+    const Vec3f P[3] = {mesh.P[t.v0], mesh.P[t.v1], mesh.P[t.v2]};
+    f(P);
+  }
+}
+
 }  // namespace
 
 /// What a divided mesh has besides places and normals.
@@ -469,16 +482,28 @@ std::uint64_t divided_mesh_bytes(const MeshView& mesh, std::span<const LatticeTr
 
 double mean_cells_a_side(const MeshView& mesh, const CellsAlong& cells)
 {
-  constexpr std::uint32_t kLooked = 4096;
-  const std::uint32_t step = std::max(mesh.num_triangles / kLooked, 1u);
   double sum = 0;
   std::uint32_t count = 0;
-  for (std::uint32_t triangle = 0; triangle < mesh.num_triangles; triangle += step, ++count) {
-    const TriangleIndices& t = mesh.triangles[triangle];
-    const Vec3f P[3] = {mesh.P[t.v0], mesh.P[t.v1], mesh.P[t.v2]};
+  for_some_triangles(mesh, [&](const Vec3f* P) {
     sum += cells(P[0], P[1]) + cells(P[1], P[2]) + cells(P[2], P[0]);
-  }
+    ++count;
+  });
   return sum / (3.0 * count);
+}
+
+double mean_pixels_a_side(const MeshView& mesh, const SeenInstances& seen)
+{
+  double sum = 0, areas = 0;
+  for_some_triangles(mesh, [&](const Vec3f* P) {
+    const double sides[3] = {seen.pixels(P[0], P[1]), seen.pixels(P[1], P[2]), seen.pixels(P[2], P[0])};
+    const double mean = (sides[0] + sides[1] + sides[2]) / 3;
+    const double half = 1.5 * mean;
+    const double area =
+        std::sqrt(std::max(half * (half - sides[0]) * (half - sides[1]) * (half - sides[2]), 0.0));  // Heron's
+    sum += area * mean;
+    areas += area;
+  });
+  return areas > 0 ? sum / areas : 0.0;
 }
 
 }  // namespace relief

@@ -14,6 +14,7 @@
 #include "displacement/deformation.h"
 #include "displacement/height_source.h"
 #include "displacement/lattice_split.h"
+#include "displacement/seen_instances.h"
 #include "kernel/shape/mesh_view.h"
 
 namespace relief {
@@ -133,5 +134,9 @@ std::uint64_t divided_mesh_bytes(const MeshView& mesh, std::span<const LatticeTr
 /// Cells that a triangle of a mesh asks for along a side, the mean of some thousands of triangles.
 /// @pre the mesh has triangles
 double mean_cells_a_side(const MeshView& mesh, const CellsAlong& cells);
+
+/// Pixels that a triangle's side is long in the picture, likewise, but by how much of the picture triangles fill; 0: nothing is seen.
+/// @pre the mesh has triangles
+double mean_pixels_a_side(const MeshView& mesh, const SeenInstances& seen);
 
 }  // namespace relief

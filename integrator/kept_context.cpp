@@ -30,8 +30,9 @@ bool is_same(const Scene& scene, const DisplacementOptions& a, const Displacemen
   return method == b.method && lod == b.lod && rmip == b.rmip && rate == b.tessellation_rate && error == b.error &&
          auto_bytes == b.auto_bytes && computed_bytes == b.computed_bytes && fields == b.fields && meshes == b.meshes &&
          choices == b.choices && dicing_bytes == b.dicing_bytes && tessellation_bytes == b.tessellation_bytes &&
-         ((auto_bytes == 0 && !dices) || num_rays == b.num_rays) &&
-         (!follows_camera || (is_same(camera, b.camera) && height == b.picture_height));
+         // What maps are made of, by the height of the picture, stays when the camera moves.
+         (scene.displacements.empty() || height == b.picture_height) &&
+         ((auto_bytes == 0 && !dices) || num_rays == b.num_rays) && (!follows_camera || is_same(camera, b.camera));
 }
 
 }  // namespace

@@ -124,8 +124,9 @@ void read_cells(const JsonReader& r, DisplacementSettings& d, Warnings& warnings
 {
   d.cell_pixels = r.number_f("cellPixels", 1, 0.01, 1e3);
   d.coarser_outside = r.number_f("coarserOutside", 4, 1, 1e3);
+  d.divide = r.boolean("divide", false);
   if (!displacement_is_computed(d)) {
-    for (const char* name : {"cells", "cellLength", "mostCells", "divide"}) {
+    for (const char* name : {"cells", "cellLength", "mostCells"}) {
       if (!r.has(name)) continue;
       static_cast<void>(r.raw(name));
       warnings.add(r.file() + ": " + json_path_join(r.path(), name) +
@@ -137,7 +138,6 @@ void read_cells(const JsonReader& r, DisplacementSettings& d, Warnings& warnings
     d.num_cells = read_num_cells(r, "cells", "\"auto\" or a power of two up to 524288");
   if (r.has("mostCells")) d.most_cells = read_num_cells(r, "mostCells", "a power of two up to 524288");
   if (r.has("cellLength")) d.cell_length = r.number_f("cellLength", 1, 1e-12, 1e12);
-  d.divide = r.boolean("divide", false);
 }
 
 /// Where the heights or vectors of a displacement come from: one of these, or with `curved` none.

@@ -16,6 +16,7 @@ class ReliefEngine(bpy.types.RenderEngine):
     bl_use_preview = True
     bl_use_postprocess = True
     bl_use_shading_nodes_custom = False
+    bl_use_custom_freestyle = True
     bl_use_eevee_viewport = True  # material preview is Eevee's
 
     def __init__(self, *arguments, **keywords):

@@ -53,7 +53,7 @@ struct DisplacementSettings {
   bool weld_seams = false;
   bool has_graph = false;  ///< heights are those of a value graph
   bool by_vectors = false;  ///< the graph says where points go, metres, object space; `scale` and what follows is in it
-  bool divide = false;      ///< computed heights move vertices of divided triangles, however small the mesh's own are
+  bool divide = false;      ///< vertices of small triangles do not stand for what is between them
   bool curved = false;     ///< the base is a smooth surface through the mesh's vertices with its normals there
 };
 

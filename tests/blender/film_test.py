@@ -17,6 +17,7 @@ from scenes import (
     new_material,
     new_scene,
     render,
+    render_runs,
     set_bounces,
     set_file_format,
     set_world,
@@ -226,3 +227,22 @@ def test_film_exposure_of_passes():
         factor = {"Variance": 16, "Samples": 1, "DiffCol": 1, "Diffuse Color": 1}.get(layer_name, 4)
         factor = 1 if name.endswith(".A") else factor
         assert np.allclose(factor * first, pictures[1][name], rtol=1e-5, atol=1e-7), name
+
+
+def test_freestyle_lines():
+    """By relief itself, as Cycles has them: Eevee's would need OpenGL."""
+    from relief import report
+
+    scene, _ = _stage()
+    scene.render.line_thickness_mode, scene.render.line_thickness = "ABSOLUTE", 3.0
+    without = render_runs(scene, "CYCLES", 1, 16)[0]
+    scene.render.use_freestyle = True
+    lines = scene.view_layers[0].freestyle_settings.linesets
+    (lines[0] if lines else lines.new("lines")).linestyle = bpy.data.linestyles.new("line")
+    report.last_warnings.clear()
+    relief, cycles = (render_runs(scene, engine, 1, 64)[0] for engine in ("RELIEF", "CYCLES"))
+    assert len(report.last_warnings) == 2, "the scene of the lines was rendered by another engine"
+    drawn = np.abs(cycles - without).max(axis=-1) > 0.1
+    assert drawn.mean() > 0.01, "there are no lines"
+    assert np.abs(relief - cycles)[drawn].mean() < 0.02, np.abs(relief - cycles)[drawn].mean()
+    assert relief[drawn].mean() < 0.7 * without[drawn].mean(), "lines are black"

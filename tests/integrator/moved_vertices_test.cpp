@@ -9,6 +9,7 @@
 #include "integrator/scene_context.h"
 #include "integrator/trace.h"
 #include "tests/support/loaded_scene.h"
+#include "tests/support/scene_builder.h"
 
 namespace relief::test {
 namespace {
@@ -36,29 +37,57 @@ json heights(double waves)
 /// A square of 2 × 2 m of n × n quads, 5 m before a camera.
 Scene square(int n, double waves, const json& more = json::object())
 {
-  std::vector<float> P, N;
+  std::vector<float> P, N, uv;
   std::vector<std::uint32_t> triangles;
   for (int j = 0; j <= n; ++j) {
     for (int i = 0; i <= n; ++i) {
-      P.insert(P.end(), {2.0f * static_cast<float>(i) / static_cast<float>(n) - 1,
-                         2.0f * static_cast<float>(j) / static_cast<float>(n) - 1, 0});
+      const float u = static_cast<float>(i) / static_cast<float>(n), v = static_cast<float>(j) / static_cast<float>(n);
+      P.insert(P.end(), {2 * u - 1, 2 * v - 1, 0});
       N.insert(N.end(), {0, 0, 1});
+      uv.insert(uv.end(), {u, v});
       if (i == n || j == n) continue;
       const auto a = static_cast<std::uint32_t>(j * (n + 1) + i), above = a + static_cast<std::uint32_t>(n) + 1;
       triangles.insert(triangles.end(), {a, a + 1, above + 1, a, above + 1, above});
     }
   }
   GltfBuilder b;
-  const int position = b.accessor(P, "VEC3"), normal = b.accessor(N, "VEC3"), indices = b.accessor(triangles, "SCALAR");
+  const int position = b.accessor(P, "VEC3"), normal = b.accessor(N, "VEC3"), at = b.accessor(uv, "VEC2"),
+            indices = b.accessor(triangles, "SCALAR");
   json displacement{{"heightGraph", heights(waves)}, {"scale", kScale}, {"midlevel", 0}, {"smoothing", true}};
   displacement.update(more);
   b.push("materials", {{"extensions", {{"RELIEF_displacement", displacement}}}});
-  b.root_node({{"mesh", b.mesh({{"attributes", {{"POSITION", position}, {"NORMAL", normal}}},
+  b.root_node({{"mesh", b.mesh({{"attributes", {{"POSITION", position}, {"NORMAL", normal}, {"TEXCOORD_0", at}}},
                                 {"indices", indices},
                                 {"material", 0}})}});
   b.push("cameras", {{"type", "perspective"}, {"perspective", {{"yfov", 0.7}, {"znear", 0.1}}}});
   b.root_node({{"camera", 0}, {"translation", {0, 0, 5}}});
   return load(b);
+}
+
+/// The same under a map of the same heights.
+Scene mapped_square(int n)
+{
+  constexpr int kTexels = 1024;
+  std::vector<std::uint16_t> texels;
+  for (int k = 0; k < kTexels * kTexels; ++k) {
+    const double x = 2 * (k % kTexels + 0.5) / kTexels - 1;
+    texels.push_back(static_cast<std::uint16_t>(std::lround(65535 * (0.5 + 0.5 * std::sin(kWaves * x)))));
+  }
+  Scene scene = square(n, kWaves);
+  DisplacementSettings by_map = add_displacement(scene, kTexels, std::move(texels), 2 * static_cast<float>(kScale));
+  by_map.smoothing = true;
+  scene.displacements = {by_map};
+  return scene;
+}
+
+/// Heights of a square at its vertices, and straight lines between them.
+auto heights_at_vertices(int quads)
+{
+  return [=](double x) {
+    const double along = 0.5 * (x + 1) * quads, i = std::floor(along);
+    const auto wave = [=](double k) { return kScale * std::sin(kWaves * (2 * k / quads - 1)); };
+    return wave(i) + (along - i) * (wave(i + 1) - wave(i));
+  };
 }
 
 DisplacementOptions options_of(const Scene& scene, int height)
@@ -100,12 +129,48 @@ TEST(MovedVertices, AreThoseOfTheMeshWhereTrianglesAreSmall)
   const SceneContext context(scene, options_of(scene, 180));
   EXPECT_EQ(context.displacements.size(), 0u);
   EXPECT_EQ(num_moved_triangles(context), 2u * kQuads * kQuads);
-  const auto at_vertices = [](double x) {
-    const double along = 0.5 * (x + 1) * kQuads, i = std::floor(along);
-    const auto wave = [](double k) { return kScale * std::sin(kWaves * (2 * k / kQuads - 1)); };
-    return wave(i) + (along - i) * (wave(i + 1) - wave(i));
+  EXPECT_LT(farthest_from(context, heights_at_vertices(kQuads)), 1e-6);
+}
+
+/// So are those of a map, where triangles are no larger than two pixels, or than the error that is allowed. (At 90 pixels a side is
+/// 1.1 long in the mean.)
+TEST(MovedVertices, AreThoseOfTheMeshWhereTrianglesUnderAMapAreSmall)
+{
+  constexpr int kQuads = 48;
+  Scene scene = mapped_square(kQuads);
+  const DisplacementOptions options = options_of(scene, 90);
+  const SceneContext small(scene, options);
+  EXPECT_EQ(num_moved_triangles(small), 2u * kQuads * kQuads);
+  // A wave sags by 9e-4 between vertices.
+  EXPECT_LT(farthest_from(small, heights_at_vertices(kQuads)), 1e-5);
+  const auto exact = [](double x) { return kScale * std::sin(kWaves * x); };
+  const auto is_exact = [&](const Scene& traced, const DisplacementOptions& by) {
+    const SceneContext context(traced, by);
+    return context.displacements.size() == 1 && farthest_from(context, exact) < 1e-5;
   };
-  EXPECT_LT(farthest_from(context, at_vertices), 1e-6);
+  EXPECT_TRUE(is_exact(scene, options_of(scene, 360)));
+  EXPECT_TRUE(is_exact(mapped_square(4), options));
+  DisplacementOptions named = options, without_picture = options, diced = options;
+  named.method = DisplacementMethod::chord;
+  EXPECT_TRUE(is_exact(scene, named));
+  without_picture.camera.reset();
+  EXPECT_TRUE(is_exact(scene, without_picture));
+  diced.error = 1;
+  EXPECT_EQ(SceneContext(scene, diced).displacements.moved().size(), 0u);
+  diced.error = 1.5;
+  EXPECT_EQ(SceneContext(scene, diced).displacements.moved().size(), 1u);
+  // What the first picture of a sequence has the others have.
+  for (const bool is_far : {true, false}) {
+    DisplacementOptions sequence = options;
+    sequence.choices = std::make_shared<DicingChoices>();
+    sequence.camera->world_from_camera.p.z = is_far ? 5.0f : 0.5f;
+    const std::size_t moved = SceneContext(scene, sequence).displacements.moved().size();
+    EXPECT_EQ(moved, is_far ? 1u : 0u);
+    sequence.camera->world_from_camera.p.z = is_far ? 0.5f : 5.0f;
+    EXPECT_EQ(SceneContext(scene, sequence).displacements.moved().size(), moved);
+  }
+  scene.displacements[0].divide = true;
+  EXPECT_TRUE(is_exact(scene, options));
 }
 
 /// Larger ones are divided to pixels, and have the heights between their vertices too.

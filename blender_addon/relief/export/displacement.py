@@ -104,12 +104,15 @@ def export_displacement(material, settings, textures, texture_info, images, grap
     info = texture_info(height.texture)
     if info is None or height.value == 0:
         return None
-    return {
+    value = {
         "heightTexture": info,
         "scale": move.scale * height.value,
         "midlevel": (move.midlevel - height.offset) / height.value,
         **_how(material, move, settings),
     }
+    if compat.displacement_method(material) == "BOTH":
+        value["divide"] = True  # what is between vertices is seen, in Cycles as bumps
+    return value
 
 
 def diced(displacement, dicing):
