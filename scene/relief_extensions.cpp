@@ -485,6 +485,7 @@ void relief_light(const GltfDocument& document,
       // So narrow a sun is a point; its radiance leaves single precision.
       constexpr float kNarrowest = 1e-14f;
       if (light.cone < kNarrowest) light.cone = 0;
+      light.faces_viewer = r.choice("shape", kShapes, 0) == 1;
       light.visible_to_camera = r.boolean("visibleToCamera", false);
     } else {
       light.radius = r.number_f("radius", 0, 0, kFarthest);

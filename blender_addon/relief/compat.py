@@ -310,9 +310,8 @@ LIGHTS_ARE_OBJECTS = IS_5_0
 AREA_DIVISOR = math.pi if IS_4_0 else 4.0
 
 
-def sun_divisor(half_angle):
-    """What a sun's irradiance is divided by for the radiance of its disk: steradians, since 4.0 weighted by their cosine."""
-    return math.pi * math.sin(half_angle) ** 2 if IS_4_0 else 2 * math.pi * (1 - math.cos(half_angle))
+#: Whether a sun shines evenly from a flat disk across its direction, so that its rim is brighter: before 4.0.
+SUNS_ARE_FLAT = not IS_4_0
 
 
 def panorama_of(camera):

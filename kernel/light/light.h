@@ -28,7 +28,8 @@ struct alignas(64) Light {
   bool visible_to_camera = true;  ///< rectangle, disk, ball, sun of an angle
   bool is_even = true;            ///< all its points send out `emission`: see emission_is_even, and lamp_index
   bool casts_caustics = true;     ///< photons start from it, where there is a photon pass
-  bool faces_viewer = false;     ///< point, spot with a radius: a disk that faces whoever looks at it instead of a ball
+  bool faces_viewer = false;  ///< point, spot with a radius: a disk that faces whoever looks at it instead of a ball;
+                              ///< sun of an angle: a flat disk, see sun.h
   std::int8_t dark_side = 0;     ///< of a mesh's light: what its front (> 0) or back (< 0) sends out ends on the mesh
                                  ///< itself, all (±2) or nearly all of it (±1); see light_sides_find
   std::uint8_t hidden_from = 0;  ///< bit PathEvent, or kHiddenFromScattered: what scatters so is not lit, see light_hides

@@ -299,14 +299,19 @@ RELIEF_KERNEL float lights_pdf(const LightsView& view,
 }
 
 /// Density with which lights_sample, called at P, would have chosen a direction of a sun that it meets.
+/// @param wi         unit, towards it
 /// @param sun_index  in `lights`
-RELIEF_KERNEL float lights_sun_pdf(const LightsView& view, Vec3f P, const LightReceiver& at, std::uint32_t sun_index)
+RELIEF_KERNEL float lights_sun_pdf(const LightsView& view,
+                                   Vec3f P,
+                                   const LightReceiver& at,
+                                   Vec3f wi,
+                                   std::uint32_t sun_index)
 {
   const Light& sun = view.lights[sun_index];
   const float importance = light_sun_importance(sun, view.channels, at);
   if (!(importance > 0.0f)) return 0.0f;
   const LightGroups groups = light_groups_eval(view, P, at);
-  return groups.suns * (importance / groups.sun_sum) * sun_light_pdf(sun);
+  return groups.suns * (importance / groups.sun_sum) * sun_light_pdf(sun, wi);
 }
 
 /// Share of the light that gets to a place in media, as far as it is known, that is the environment's; 0: it is not asked for there.

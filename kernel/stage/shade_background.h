@@ -17,7 +17,7 @@ RELIEF_KERNEL void shade_sun_disks(const KernelGlobals& g, PathState& state, std
     const Light& sun = g.lights.lights[index];
     if (!light_is_sun_disk(sun) || !sun_light_is_met(sun, D) || !path_sees_light(state, path, sun)) continue;
     if (path_leaves_to_photons(g, state.flags[path], static_cast<std::int32_t>(index))) continue;
-    Vec3f radiance = sun_light_radiance(sun);
+    Vec3f radiance = sun_light_radiance(sun, D);
     if (!sun.is_even) radiance = emitter_radiance(g, sun, radiance, {{}, {}, -D, lamp_ray(g, state, path)});
     const Vec3f seen = path_throughput(state, path) * radiance;
     if (is_zero(seen)) continue;
@@ -26,7 +26,7 @@ RELIEF_KERNEL void shade_sun_disks(const KernelGlobals& g, PathState& state, std
     const float pdf = state.pdf[path];
     const float weight = pdf > 0.0f ? path_bsdf_weight(g.light_technique, pdf,
                                                        lights_sun_pdf(g.lights, path_origin(state, path),
-                                                                      path_scattered_at(state, path), index))
+                                                                      path_scattered_at(state, path), D, index))
                                     : 1.0f;
     path_add_radiance(g, state, path, scatterings, seen * weight, sun.light_group);
   }

@@ -137,6 +137,13 @@ def test_sun_with_angle():
     assert_agrees(scene, samples=32)
 
 
+def test_wide_suns():
+    """Before 4.0 they are flat disks, whose rim is brighter: as even ones they were up to 13 % off."""
+    for angle in (57, 120):
+        scene = _stage(lambda: add_light("SUN", rotation=degrees(40, 20, 0), energy=3, angle=math.radians(angle)))
+        assert_agrees(scene, samples=64)
+
+
 def _spot(degrees_wide, blend, radius=0.0):
     def light():
         spot = {"energy": 500, "spot_size": math.radians(degrees_wide), "spot_blend": blend, "shadow_soft_size": radius}

@@ -87,9 +87,12 @@ def export_light(light, place):
         value = {"type": "directional", "intensity": energy}
         if light.angle > 0:
             angle = min(light.angle, _WIDEST_SUN)
-            # Cycles' radiance; the format has the irradiance that it causes on a plane across.
-            value["intensity"] *= math.pi * math.sin(angle / 2) ** 2 / compat.sun_divisor(angle / 2)
             own = {"angle": angle, **own}
+            if compat.SUNS_ARE_FLAT:
+                # The format has the irradiance that it causes on a plane across.
+                cosine = math.cos(angle / 2)
+                value["intensity"] *= 2 * cosine / (1 + cosine)
+                own["shape"] = "disk"
         if own:
             place.writer.extend(value, "RELIEF_light", own)
         _add_punctual(place, value, color)

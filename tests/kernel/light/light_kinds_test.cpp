@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <vector>
 
 #include "kernel/light/light_sampler.h"
@@ -591,8 +592,10 @@ TEST(SunLight, IrradianceIsTheSameEverywhere)
 /// The sampler, its density and what rays meet are of the same cone, which causes the irradiance that was asked for.
 TEST(SunLight, OfAnAngleFillsItsCone)
 {
-  for (const double half : {1e-4, 4.65e-3, 0.1, 1.0, 1.55}) {
+  for (const double signed_half : {1e-4, 4.65e-3, 0.1, 1.0, 1.55, -1e-4, -4.65e-3, -0.1, -1.0, -1.2}) {
+    const double half = std::abs(signed_half);
     Light light;
+    light.faces_viewer = signed_half < 0;
     light.kind = LightKind::kSun;
     light.axis = normalize(Vec3f{0.3f, -0.8f, 0.5f});
     light.emission = {3, 2, 1};
@@ -603,7 +606,7 @@ TEST(SunLight, OfAnAngleFillsItsCone)
       const Vec2f u{(static_cast<float>(i % kSteps) + 0.5f) / kSteps, (static_cast<float>(i / kSteps) + 0.5f) / kSteps};
       const LightSample sample = light_sample(light, {1e6f, 5, 0}, u);
       ASSERT_TRUE(sun_light_is_met(light, sample.wi)) << half;
-      ASSERT_EQ(sample.pdf, sun_light_pdf(light));
+      ASSERT_EQ(sample.pdf, sun_light_pdf(light, sample.wi));
       ASSERT_FALSE(sample.delta);
       irradiance += static_cast<double>(sample.radiance.x) * -static_cast<double>(dot(sample.wi, light.axis)) /
                     static_cast<double>(sample.pdf);
@@ -615,6 +618,34 @@ TEST(SunLight, OfAnAngleFillsItsCone)
     };
     EXPECT_TRUE(sun_light_is_met(light, at_angle(half * 0.99)));
     EXPECT_FALSE(sun_light_is_met(light, at_angle(half * 1.01)));
+  }
+}
+
+/// Of a flat sun a plane sees what a disk at a distance of 1 sends it, each part as much: the sum over the disk in double precision.
+TEST(SunLight, ThatIsFlatLightsPlanesAsADiskDoes)
+{
+  const double half = 1.05, tangent = std::tan(half);
+  Light light;
+  light.kind = LightKind::kSun;
+  light.faces_viewer = true;
+  light.axis = {0, 0, -1};
+  light.emission = {1, 1, 1};
+  light.cone = static_cast<float>(2 * std::sin(half / 2) * std::sin(half / 2));
+  for (const double tilt : {0.0, 0.5, 1.0, 1.6, 2.2}) {
+    const double N[3] = {std::sin(tilt), 0, std::cos(tilt)};
+    constexpr int kSteps = 512;
+    double expected = 0, across = 0, found = 0;
+    for (int i = 0; i < kSteps * kSteps; ++i) {
+      const double u = (i % kSteps + 0.5) / kSteps, turn = 2 * std::numbers::pi * (i / kSteps + 0.5) / kSteps;
+      const double r = tangent * std::sqrt(u), cosine = 1 / std::sqrt(1 + r * r);
+      expected += std::max(cosine * (r * std::cos(turn) * N[0] + N[2]), 0.0);
+      across += cosine;
+      const LightSample sample =
+          light_sample(light, {}, {static_cast<float>(u), static_cast<float>(i / kSteps + 0.5) / kSteps});
+      const Vec3f n{static_cast<float>(N[0]), 0, static_cast<float>(N[2])};
+      found += static_cast<double>(sample.radiance.y * std::max(dot(sample.wi, n), 0.0f) / sample.pdf);
+    }
+    EXPECT_NEAR(found / (kSteps * kSteps), expected / across, 1e-4) << tilt;
   }
 }
 
