@@ -25,17 +25,14 @@ constexpr double kDividedCells = 2;
 /// A mesh of fewer triangles was not divided to be displaced: however small it is now, the camera may come near.
 constexpr std::uint32_t kLeastMovedTriangles = 64;
 
-/// Whether a mesh may have been divided to be displaced.
-bool is_divided(const DisplacementSettings& settings, const MeshView& mesh)
-{
-  return !settings.divide && mesh.num_triangles >= kLeastMovedTriangles;
-}
+/// The same under a map, which is exact in what is near: of fewer there is little to gain.
+constexpr std::uint32_t kLeastMapTriangles = 10'000;
 
 /// Whether a mesh's own vertices are moved.
 /// @param cells  along a side of its triangles in the mean
 bool is_dense(const DisplacementSettings& settings, const MeshView& mesh, double cells)
 {
-  return is_divided(settings, mesh) && cells <= kMostMovedCells;
+  return !settings.divide && mesh.num_triangles >= kLeastMovedTriangles && cells <= kMostMovedCells;
 }
 
 bool has_one_height(const HeightMapView& map)
@@ -111,8 +108,8 @@ VertexMove DisplacementSet::vertex_move_of(const Use& use,
 
 VertexMove DisplacementSet::map_move_of(const Use& use, const DisplacementOptions& options)
 {
-  if (!options.camera || options.picture_height <= 0 || lod_of(use.settings, options) > 0 ||
-      !is_divided(use.settings, use.mesh)) {
+  if (!options.camera || options.picture_height <= 0 || lod_of(use.settings, options) > 0 || use.settings.divide ||
+      use.mesh.num_triangles < kLeastMapTriangles) {
     return VertexMove::kNone;
   }
   VertexMove* chosen = nullptr;

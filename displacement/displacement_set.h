@@ -229,8 +229,9 @@ class DisplacementSet {
                             const DisplacementOptions& options,
                             std::vector<LatticeTriangle>* parts,
                             std::uint64_t* used_bytes);
-  /// The same for vectors: where even tiles have no room, or the mesh deforms, triangles are larger.
+  /// The same for a map: those of a dense mesh, or none.
   VertexMove map_move_of(const Use& use, const DisplacementOptions& options);
+  /// The same for vectors: where even tiles have no room, or the mesh deforms, triangles are larger.
   VertexMove vector_move_of(const Use& use,
                             const DisplacementOptions& options,
                             std::vector<LatticeTriangle>* parts,

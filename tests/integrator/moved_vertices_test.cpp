@@ -3,9 +3,11 @@
 
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <random>
 #include <vector>
 
+#include "integrator/kept_context.h"
 #include "integrator/scene_context.h"
 #include "integrator/trace.h"
 #include "tests/support/loaded_scene.h"
@@ -16,7 +18,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr double kScale = 0.05, kWaves = 9;
+constexpr double kScale = 0.05, kWaves = 9, kTiledWaves = 3 * std::numbers::pi;
 
 /// Sine of one object coordinate; with `kWaves` 0 the same everywhere.
 json heights(double waves)
@@ -64,14 +66,14 @@ Scene square(int n, double waves, const json& more = json::object())
   return load(b);
 }
 
-/// The same under a map of the same heights.
+/// The same under a map of such heights, which tile.
 Scene mapped_square(int n)
 {
   constexpr int kTexels = 1024;
   std::vector<std::uint16_t> texels;
   for (int k = 0; k < kTexels * kTexels; ++k) {
     const double x = 2 * (k % kTexels + 0.5) / kTexels - 1;
-    texels.push_back(static_cast<std::uint16_t>(std::lround(65535 * (0.5 + 0.5 * std::sin(kWaves * x)))));
+    texels.push_back(static_cast<std::uint16_t>(std::lround(65535 * (0.5 + 0.5 * std::sin(kTiledWaves * x)))));
   }
   Scene scene = square(n, kWaves);
   DisplacementSettings by_map = add_displacement(scene, kTexels, std::move(texels), 2 * static_cast<float>(kScale));
@@ -81,11 +83,11 @@ Scene mapped_square(int n)
 }
 
 /// Heights of a square at its vertices, and straight lines between them.
-auto heights_at_vertices(int quads)
+auto heights_at_vertices(int quads, double waves)
 {
   return [=](double x) {
     const double along = 0.5 * (x + 1) * quads, i = std::floor(along);
-    const auto wave = [=](double k) { return kScale * std::sin(kWaves * (2 * k / quads - 1)); };
+    const auto wave = [=](double k) { return kScale * std::sin(waves * (2 * k / quads - 1)); };
     return wave(i) + (along - i) * (wave(i + 1) - wave(i));
   };
 }
@@ -129,35 +131,35 @@ TEST(MovedVertices, AreThoseOfTheMeshWhereTrianglesAreSmall)
   const SceneContext context(scene, options_of(scene, 180));
   EXPECT_EQ(context.displacements.size(), 0u);
   EXPECT_EQ(num_moved_triangles(context), 2u * kQuads * kQuads);
-  EXPECT_LT(farthest_from(context, heights_at_vertices(kQuads)), 1e-6);
+  EXPECT_LT(farthest_from(context, heights_at_vertices(kQuads, kWaves)), 1e-6);
 }
 
-/// So are those of a map, where triangles are no larger than two pixels, or than the error that is allowed. (At 90 pixels a side is
-/// 1.1 long in the mean.)
+/// So are those of a map, where triangles are no larger than two pixels, or than the error that is allowed, and many. (At 90 pixels a
+/// side is .7 long in the mean.)
 TEST(MovedVertices, AreThoseOfTheMeshWhereTrianglesUnderAMapAreSmall)
 {
-  constexpr int kQuads = 48;
+  constexpr int kQuads = 80;
   Scene scene = mapped_square(kQuads);
   const DisplacementOptions options = options_of(scene, 90);
   const SceneContext small(scene, options);
   EXPECT_EQ(num_moved_triangles(small), 2u * kQuads * kQuads);
-  // A wave sags by 9e-4 between vertices.
-  EXPECT_LT(farthest_from(small, heights_at_vertices(kQuads)), 1e-5);
-  const auto exact = [](double x) { return kScale * std::sin(kWaves * x); };
+  // A wave sags by 3e-4 between vertices.
+  EXPECT_LT(farthest_from(small, heights_at_vertices(kQuads, kTiledWaves)), 1e-5);
+  const auto exact = [](double x) { return kScale * std::sin(kTiledWaves * x); };
   const auto is_exact = [&](const Scene& traced, const DisplacementOptions& by) {
     const SceneContext context(traced, by);
     return context.displacements.size() == 1 && farthest_from(context, exact) < 1e-5;
   };
-  EXPECT_TRUE(is_exact(scene, options_of(scene, 360)));
-  EXPECT_TRUE(is_exact(mapped_square(4), options));
+  EXPECT_TRUE(is_exact(scene, options_of(scene, 720)));
+  EXPECT_TRUE(is_exact(mapped_square(48), options));
   DisplacementOptions named = options, without_picture = options, diced = options;
   named.method = DisplacementMethod::chord;
   EXPECT_TRUE(is_exact(scene, named));
   without_picture.camera.reset();
   EXPECT_TRUE(is_exact(scene, without_picture));
-  diced.error = 1;
+  diced.error = 0.5;
   EXPECT_EQ(SceneContext(scene, diced).displacements.moved().size(), 0u);
-  diced.error = 1.5;
+  diced.error = 1;
   EXPECT_EQ(SceneContext(scene, diced).displacements.moved().size(), 1u);
   // What the first picture of a sequence has the others have.
   for (const bool is_far : {true, false}) {
@@ -171,6 +173,21 @@ TEST(MovedVertices, AreThoseOfTheMeshWhereTrianglesUnderAMapAreSmall)
   }
   scene.displacements[0].divide = true;
   EXPECT_TRUE(is_exact(scene, options));
+}
+
+/// What is kept for the next picture stays where the camera moves, and is made anew for a picture of another height.
+TEST(MovedVertices, UnderAMapAreChosenByTheHeightOfThePicture)
+{
+  const Scene scene = mapped_square(80);
+  KeptContext kept;
+  ContextOptions options;
+  options.displacement = options_of(scene, 90);
+  EXPECT_EQ(kept.get(scene, options).displacements.moved().size(), 1u);
+  options.displacement.camera->world_from_camera.p.z = 0.5f;
+  EXPECT_EQ(kept.get(scene, options).displacements.moved().size(), 1u);
+  EXPECT_TRUE(kept.is_kept());
+  options.displacement.picture_height = 720;
+  EXPECT_EQ(kept.get(scene, options).displacements.moved().size(), 0u);
 }
 
 /// Larger ones are divided to pixels, and have the heights between their vertices too.
