@@ -30,4 +30,7 @@ std::uint64_t memory_of_machine();  ///< bytes
 /// "1.5 GiB"
 std::string gibibytes(std::uint64_t bytes);
 
+/// Whether a mesh under a map may have been divided to be displaced, so that its vertices are moved in pictures that show it small.
+bool map_may_move_vertices(const DisplacementSettings& settings, std::size_t num_triangles);
+
 }  // namespace relief

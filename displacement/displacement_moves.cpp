@@ -45,6 +45,11 @@ bool has_one_height(const HeightMapView& map)
 
 }  // namespace
 
+bool map_may_move_vertices(const DisplacementSettings& settings, std::size_t num_triangles)
+{
+  return !displacement_is_computed(settings) && !settings.divide && num_triangles >= kLeastMapTriangles;
+}
+
 VertexMove DisplacementSet::vertex_move_of(const Use& use,
                                            const DisplacementOptions& options,
                                            std::vector<LatticeTriangle>* parts,
@@ -108,8 +113,8 @@ VertexMove DisplacementSet::vertex_move_of(const Use& use,
 
 VertexMove DisplacementSet::map_move_of(const Use& use, const DisplacementOptions& options)
 {
-  if (!options.camera || options.picture_height <= 0 || lod_of(use.settings, options) > 0 || use.settings.divide ||
-      use.mesh.num_triangles < kLeastMapTriangles) {
+  if (!options.camera || options.picture_height <= 0 || lod_of(use.settings, options) > 0 ||
+      !map_may_move_vertices(use.settings, use.mesh.num_triangles)) {
     return VertexMove::kNone;
   }
   VertexMove* chosen = nullptr;

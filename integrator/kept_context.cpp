@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cstring>
 
+#include "displacement/displacement_choice.h"
 #include "integrator/scene_context.h"
 
 namespace relief {
@@ -27,12 +28,19 @@ bool is_same(const Scene& scene, const DisplacementOptions& a, const Displacemen
   const bool follows_camera =
       dices || std::any_of(scene.displacements.begin(), scene.displacements.end(),
                            [](const DisplacementSettings& d) { return displacement_is_computed(d); });
+  // What maps are made of, by the height of the picture, stays when the camera moves.
+  const auto follows_height = [&](const Instance& instance) {
+    const int index = scene.materials[static_cast<std::size_t>(instance.material_index)].displacement_index;
+    return index >= 0 &&
+           map_may_move_vertices(scene.displacements[static_cast<std::size_t>(index)],
+                                 scene.meshes[static_cast<std::size_t>(instance.mesh_index)].triangles.size());
+  };
   return method == b.method && lod == b.lod && rmip == b.rmip && rate == b.tessellation_rate && error == b.error &&
          auto_bytes == b.auto_bytes && computed_bytes == b.computed_bytes && fields == b.fields && meshes == b.meshes &&
          choices == b.choices && dicing_bytes == b.dicing_bytes && tessellation_bytes == b.tessellation_bytes &&
-         // What maps are made of, by the height of the picture, stays when the camera moves.
-         (scene.displacements.empty() || height == b.picture_height) &&
-         ((auto_bytes == 0 && !dices) || num_rays == b.num_rays) && (!follows_camera || is_same(camera, b.camera));
+         ((auto_bytes == 0 && !dices) || num_rays == b.num_rays) &&
+         (!follows_camera || (is_same(camera, b.camera) && height == b.picture_height)) &&
+         (height == b.picture_height || std::none_of(scene.instances.begin(), scene.instances.end(), follows_height));
 }
 
 }  // namespace
