@@ -14,7 +14,7 @@ namespace {
 /// 320 × 180 pixels 294 processor seconds instead of 7, cracks on 200 × 200 at 1280 × 720, of six cells, 78 instead of 9).
 constexpr double kMostMovedCells = 16;
 
-/// Of maps, pixels: between vertices so close a ray finds no more than the picture can show, and takes five times as long to find
+/// Of maps, pixels: between vertices so close a ray finds no more than the picture can show, and takes seven times as long to find
 /// it. Whoever divides a mesh so finely has it displaced at its vertices by every other renderer.
 constexpr double kMostMovedPixels = 2;
 

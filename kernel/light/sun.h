@@ -1,5 +1,5 @@
-// Sun: light from infinitely far away, parallel or from a cone of directions. What it looks like
-// does not depend on the place, however far from the origin that is.
+// Sun: light from infinitely far away, parallel or from a cone of directions. What it looks like does not depend on the place,
+// however far from the origin that is.
 #pragma once
 
 #include "kernel/light/light_sample.h"
@@ -15,7 +15,7 @@ struct FarLight {
 
 struct SunLight : FarLight {};
 
-/// A flat sun is sampled evenly over a disk across its axis, at a distance of 1: that is the square of its radius.
+/// Squared radius of the disk across a flat sun's axis, at a distance of 1, over which it is sampled evenly.
 /// @source  Cycles before 4.0, which has all its suns so
 RELIEF_KERNEL float sun_light_disk(const Light& light)
 {

@@ -138,7 +138,7 @@ def test_sun_with_angle():
 
 
 def test_wide_suns():
-    """Before 4.0 they are flat disks, whose rim is brighter: as even ones they were up to 13 % off."""
+    """Before 4.0 they are flat disks, whose rim is brighter: one of 120° lit what faces it 13 % too much."""
     for angle in (57, 120):
         scene = _stage(lambda: add_light("SUN", rotation=degrees(40, 20, 0), energy=3, angle=math.radians(angle)))
         assert_agrees(scene, samples=64)
