@@ -420,7 +420,7 @@ ContentHash Accel::top_content(const Scene& scene,
   }
   for (const std::uint32_t index : area_lights) {
     const Light& light = lights[index];
-    hash.add(light.kind, light.visible_to_camera, light.radius);
+    hash.add(light.kind, light.visible_to_camera, light.multiple_importance, light.radius);
     for (const Vec3f v : {light.P, light.edge_u, light.edge_v}) hash.add(v.x, v.y, v.z);
   }
   return hash.result();
@@ -457,7 +457,8 @@ void Accel::build_top(const Scene& scene, std::span<const Light> lights, std::sp
     const Light& light = lights[area_lights[i]];
     RTCGeometry geometry = light_is_quad(light) && light.motion_index < 0 ? new_rectangle(light) : new_light(light);
     const auto id = static_cast<unsigned>(scene.instances.size() + i);
-    const std::uint32_t seen = kRayBounce | (light.visible_to_camera ? std::uint32_t{kRayCamera} : 0u);
+    const std::uint32_t seen = (light.multiple_importance ? std::uint32_t{kRayBounce} : 0u) |
+                               (light.visible_to_camera ? std::uint32_t{kRayCamera} : 0u);
     const std::uint32_t mask = seen | seen << kRayCatchersShift;
     const Box3 with_light = box_union(scene_->target, light_box(light));
     if (with_light.low != scene_->target.low || with_light.high != scene_->target.high) {

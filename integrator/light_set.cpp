@@ -83,8 +83,11 @@ LightSet light_set_make(const Scene& scene,
   environment_integrate(set);
   set.environment_casts_caustics = scene.environment.casts_caustics && scene.environment.hidden_from == 0;
   set.lights = scene.lights;
-  // Likewise of lamps: photons come to a surface as no kind of ray.
-  for (Light& light : set.lights) light.casts_caustics = light.casts_caustics && light.hidden_from == 0;
+  // Likewise of lamps: photons come to a surface as no kind of ray. And paths would bring no caustics of one that is only
+  // asked for.
+  for (Light& light : set.lights) {
+    light.casts_caustics = light.casts_caustics && light.hidden_from == 0 && light.multiple_importance;
+  }
   if (globals != nullptr) set.motions = globals->lights.motions;
   if (globals != nullptr) lamps_scale(*globals, set.lights);
   emissive_meshes_add(scene, textures, globals, set);

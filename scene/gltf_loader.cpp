@@ -508,6 +508,7 @@ void GltfLoader::place_lights(const PlacedNode& node)
       memory_.add(sizeof(Light) * lights.size(), node.document->file + ": lights");
       scene_.lights.insert(scene_.lights.end(), lights.begin(), lights.end());
       scene_.lights.back().casts_caustics = node.object.caustic_light;
+      scene_.lights.back().multiple_importance = node.object.multiple_importance;
       scene_.lights.back().hidden_from = static_cast<std::uint8_t>(node.object.hidden_from);
       scene_.lights.back().light_group = static_cast<std::uint8_t>(light_group_of(node));
       scene_.lights.back().in_footage = node.object.lights_footage;

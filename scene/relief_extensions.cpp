@@ -589,6 +589,7 @@ ObjectSettings relief_object(const GltfDocument& document, int node_index, Objec
     s.casts_shadow = r.boolean("castsShadow", s.casts_shadow);
     s.caustic_receiver = r.boolean("causticReceiver", s.caustic_receiver);
     s.caustic_light = r.boolean("causticLight", s.caustic_light);
+    s.multiple_importance = r.boolean("multipleImportance", s.multiple_importance);
     s.holdout = r.boolean("holdout", s.holdout);
     s.shadow_catcher = r.boolean("shadowCatcher", s.shadow_catcher);
     s.light_group = read_light_group(r, s.light_group);

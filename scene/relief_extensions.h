@@ -68,6 +68,7 @@ struct ObjectSettings {
   CausticCaster caustic_caster = CausticCaster::kAuto;
   bool caustic_receiver = true;
   bool caustic_light = true;
+  bool multiple_importance = true;  ///< of lights: see Light::multiple_importance
   bool holdout = false;
   bool shadow_catcher = false;
   std::string light_group;        ///< empty: none

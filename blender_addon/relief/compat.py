@@ -421,6 +421,17 @@ def light_color(light):
     return tuple(a * b for a, b in zip(color, light.temperature_color))
 
 
+def has_multiple_importance(light):
+    """Whether rays that scatter meet a light, too."""
+    return getattr(getattr(light, "cycles", None), "use_multiple_importance_sampling", True)
+
+
+def is_met_by_rays(light):
+    """Whether rays that scatter meet a light that has a size."""
+    size = {"AREA": 1.0, "SUN": getattr(light, "angle", 0.0)}.get(light.type, getattr(light, "shadow_soft_size", 0.0))
+    return has_multiple_importance(light) and size > 0
+
+
 def faces_viewer(light):
     """Whether a point or spot with a radius is a disk that faces each point; later it is a ball, unless asked."""
     return not IS_4_0 or getattr(light, "use_soft_falloff", False)

@@ -34,6 +34,7 @@ struct alignas(64) Light {
                                  ///< itself, all (±2) or nearly all of it (±1); see light_sides_find
   std::uint8_t hidden_from = 0;  ///< bit PathEvent, or kHiddenFromScattered: what scatters so is not lit, see light_hides
   std::uint8_t light_group = 0;  ///< number of a group from 1 on; 0: none
+  bool multiple_importance = true;  ///< rays that scatter meet it; else it is only asked for
   bool in_footage = true;        ///< it lights shadow catchers where they are alone, too
   Vec3f P{};                     ///< position or centre, metres (triangle: first vertex)
   Vec3f axis{0, 0, -1};          ///< unit: spot and sun: direction of travel; rectangle, disk, triangle: emitting side

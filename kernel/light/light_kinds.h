@@ -48,7 +48,8 @@ RELIEF_KERNEL bool light_is_met(const Light& light)
 {
   return light_visit(light, [&](auto kind) {
     if constexpr (kind.kBody == LightBody::kOwn) {
-      return light.instance_index < 0 && light_is_met(kind, light);
+      return light.instance_index < 0 && (light.multiple_importance || light.visible_to_camera) &&
+             light_is_met(kind, light);
     } else {
       return false;
     }

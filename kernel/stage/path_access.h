@@ -259,9 +259,11 @@ RELIEF_KERNEL float path_light_weight(LightTechnique technique, float pdf_light,
 /// Whether a path that meets a light adds it, or none of it comes this way, or all of it is for next-event estimation to find.
 RELIEF_KERNEL bool path_sees_light(const PathState& s, std::uint32_t i, const Light& light)
 {
-  if ((s.flags[i] & kPathScattered) != 0) return (light.hidden_from & kHiddenFromScattered) == 0;
   const auto event = static_cast<PathEvent>(path_event(s.flags[i]));
-  if (event == PathEvent::kCamera) return light.visible_to_camera;
+  const bool is_scattered = (s.flags[i] & kPathScattered) != 0;
+  if (!is_scattered && event == PathEvent::kCamera) return light.visible_to_camera;
+  if (!light.multiple_importance) return false;
+  if (is_scattered) return (light.hidden_from & kHiddenFromScattered) == 0;
   if (light.hidden_from == 0) return true;
   // Of single directions the event is known.
   if (!(s.pdf[i] > 0.0f)) return (light.hidden_from >> static_cast<int>(event) & 1u) == 0;

@@ -101,7 +101,8 @@ RELIEF_KERNEL void shade_medium_light_at(const KernelGlobals& g,
   if (answer.emitter != nullptr && (answer.emitter->hidden_from & kHiddenFromScattered) != 0) return;
   const PhaseEval phase = media_eval(media, at.D, light.wi);
   const float found = fate.asks_sky && answer.emitter == nullptr ? phase.pdf : phase.pdf * fate.offered;
-  const float weight = path_light_weight(g.light_technique, light.pdf, found, light.delta);
+  const bool is_found_here_alone = light.delta || (answer.emitter != nullptr && !answer.emitter->multiple_importance);
+  const float weight = path_light_weight(g.light_technique, light.pdf, found, is_found_here_alone);
   const Vec3f gain = place.carried * phase.f * answer.radiance * (weight / (light.pdf * place.pdf));
   if (is_zero(gain)) return;
   Vec3f D;

@@ -58,11 +58,11 @@ RELIEF_KERNEL void shade_surface_lit(const KernelGlobals& g,
       bsdf.f = shade_surface_soft<kFeatures>(g, closure, kAllSharp, wi);
     }
   }
-  bool is_found_here_alone = light.delta;
+  bool is_found_here_alone = light.delta || (emitter != nullptr && !emitter->multiple_importance);
   if (emitter != nullptr && __builtin_expect(emitter->hidden_from != 0, 0)) {
     const LightHides hides = light_hides(*emitter, transmits());
     // Rays that do not see a mesh pass it, each by its own lobe.
-    is_found_here_alone = light.delta || (hides.differs() && emitter->instance_index < 0);
+    is_found_here_alone = is_found_here_alone || (hides.differs() && emitter->instance_index < 0);
     bsdf.f = shade_surface_seen_by<kFeatures>(g, closure, wi, bsdf.f, hides);
   }
   if (is_zero(bsdf.f)) return;

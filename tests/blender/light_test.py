@@ -71,6 +71,37 @@ def test_lamps_that_take_light_away():
     assert_agrees(_stage(lights), samples=32)
 
 
+def _set_multiple_importance(light, is_used):
+    """Of a light that the camera may see."""
+    light.data.cycles.use_multiple_importance_sampling = is_used
+    light.visible_camera = True
+    return light
+
+
+def test_lamps_without_multiple_importance():
+    """Neither mirrors nor glass show them; the camera does only where there is a lamp that rays meet."""
+
+    def lights(*others):
+        _set_multiple_importance(add_light("POINT", (-0.8, 1.5, 1), energy=100, shadow_soft_size=0.4), False)
+        _set_multiple_importance(add_light("AREA", (1, 1, 4), energy=60, size=1), False)
+        for other in others:
+            other()
+        mirror = new_material("mirror", "ShaderNodeBsdfGlossy", Roughness=0.0)[0]
+        add_sphere(0.6, mirror, location=(-1.2, -0.3, 0.6))
+        glass = new_material("glass", "ShaderNodeBsdfGlass", Roughness=0.0)[0]
+        add_sphere(0.6, glass, location=(1.6, 0.2, 0.6))
+
+    def sun(angle, is_met):
+        return lambda: _set_multiple_importance(add_light("SUN", (0, 0, 1), degrees(-50, 0, 20), energy=1, angle=angle), is_met)
+
+    for others in ((), (sun(0.3, False),), (sun(0.02, True),), (sun(0, True),)):
+        scene = _stage(lambda others=others: lights(*others))
+        scene.relief.use_cycles_settings = True
+        scene.cycles.caustics_reflective = scene.cycles.caustics_refractive = False
+        set_bounces(scene, 2)
+        assert_agrees(scene)
+
+
 def test_nodes_of_constants():
     assert_agrees(_stage(_add_light_with_nodes))
 

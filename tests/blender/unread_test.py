@@ -70,7 +70,6 @@ def test_settings_of_things_that_change_cycles_picture_alone():
     for change, *texts in (
         (dice, "adaptive subdivision", "2"),
         (offset, "shadow terminator"),
-        (lambda _: setattr(bpy.data.lights[0].cycles, "use_multiple_importance_sampling", False), "Multiple Importance"),
     ):
         _assert_warned_once(change, *texts)
 

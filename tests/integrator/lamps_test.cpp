@@ -1,5 +1,6 @@
 // Lamps that are not quite as others: that hold the camera, are seen by some rays alone, or are far away; and media that the
 // camera stands in. Each has a closed form.
+#include "tests/support/medium_scenes.h"
 #include "tests/support/render_scene.h"
 #include "tests/support/scene_builder.h"
 
@@ -292,6 +293,65 @@ TEST(HiddenLight, IsNotMirrored)
   EXPECT_NEAR(render_scene(scene, render_options(scene, 4, 16)).mean(), 5.0, 1e-3);
   scene.lights[0].hidden_from = hidden({PathEvent::kGlossy});
   EXPECT_EQ(render_scene(scene, render_options(scene, 4, 16)).mean(), 0.0);
+}
+
+/// Lamps of all kinds that have a size, above the floor; the camera does not see them.
+std::vector<Light> sized_lights()
+{
+  std::vector<Light> lights{flat_light(LightKind::kRectangle, {0.5f, 0, 3}, 1, 5), ball_light({0.5f, 0, 3}, 0.6f, 5),
+                            sun_disk(0.4f, {0.3f, 0, -1}, 5)};
+  for (Light& light : lights) light.visible_to_camera = false;
+  return lights;
+}
+
+/// One that is only asked for lights as much as one that is met, too.
+TEST(LightWithoutMultipleImportance, LightsSurfacesAndMediaAsMuch)
+{
+  Material plastic = diffuse_material({0.6f, 0.6f, 0.6f});
+  plastic.specular = 1;
+  plastic.roughness = 0.3f;
+  for (const bool has_fog : {false, true}) {
+    for (const Light& light : sized_lights()) {
+      Scene scene = far_floor(0);
+      scene.materials[0] = plastic;
+      if (has_fog) {
+        if (light.kind == LightKind::kSun) continue;
+        scene.environment.medium = scattering(splat3(0.1f), 0.5f);
+        scene.render.volume_bounces = scene.render.max_bounces = 1;
+      }
+      scene.lights.push_back(light);
+      const Estimate met = estimate_mean(scene, render_options(scene, 8, 64), kRuns);
+      scene.lights[0].multiple_importance = false;
+      const Estimate asked = estimate_mean(scene, render_options(scene, 8, 64), kRuns);
+      EXPECT_GT(asked.mean, 30 * asked.standard_error);
+      EXPECT_NEAR(asked.mean, met.mean, kQuantile * (asked.standard_error + met.standard_error));
+    }
+  }
+}
+
+TEST(LightWithoutMultipleImportance, IsNotMirroredButMayBeSeen)
+{
+  Material mirror = diffuse_material({1, 1, 1});
+  mirror.metallic = 1;
+  mirror.roughness = 0;
+  for (Light& light : sized_lights()) {
+    Scene scene = far_floor(0);
+    scene.materials[0] = mirror;
+    // All of the sky that the floor mirrors.
+    if (light.kind == LightKind::kRectangle) light = flat_light(LightKind::kRectangle, {0, 0, 6}, 3, 5);
+    if (light.kind == LightKind::kSun) light = sun_disk(3.0f, {0, 0, -1}, 5);
+    light.visible_to_camera = false;
+    scene.lights.push_back(light);
+    scene.render.max_bounces = scene.render.glossy_bounces = 1;
+    EXPECT_GT(render_scene(scene, render_options(scene, 8, 16)).mean(), 0.01);
+    scene.lights[0].multiple_importance = false;
+    EXPECT_EQ(render_scene(scene, render_options(scene, 8, 16)).mean(), 0.0);
+  }
+  Scene scene = empty_scene();
+  scene.lights.push_back(sun_disk(1.0f, {0, 0, 1}, 3));
+  scene.lights[0].multiple_importance = false;
+  scene.lights[0].visible_to_camera = true;
+  EXPECT_GT(render_scene(scene, render_options(scene, 4, 1)).mean(), 1.0);
 }
 
 std::uint32_t hidden_flags(std::initializer_list<PathEvent> events)

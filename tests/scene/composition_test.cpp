@@ -168,19 +168,21 @@ TEST(Composition, ObjectSettingsAreInheritedAndOverruled)
 TEST(Composition, ShadowCatchersAreInheritedAndNoNumbers)
 {
   GltfBuilder b = test::square_scene();
-  b.json["nodes"] = {{{"children", {1, 2}}, {"extensions", {{"RELIEF_object", {{"shadowCatcher", true}}}}}},
-                     {{"mesh", 0}},
-                     {{"extensions",
-                       {{"RELIEF_area_light", {{"radiance", 1}}},
-                        {"RELIEF_object", {{"shadowCatcher", false}, {"lightsFootage", false}}}}},
-                      {"mesh", 0}}};
+  b.json["nodes"] = {
+      {{"children", {1, 2}}, {"extensions", {{"RELIEF_object", {{"shadowCatcher", true}}}}}},
+      {{"mesh", 0}},
+      {{"extensions",
+        {{"RELIEF_area_light", {{"radiance", 1}}},
+         {"RELIEF_object", {{"shadowCatcher", false}, {"lightsFootage", false}, {"multipleImportance", false}}}}},
+       {"mesh", 0}}};
   const Scene scene = load(b);
   ASSERT_EQ(scene.instances.size(), 2u);
   EXPECT_NE(scene.instances[0].flags & kShadowCatcher, 0u);
   EXPECT_EQ(scene.instances[1].flags & kShadowCatcher, 0u);
   ASSERT_EQ(scene.lights.size(), 1u);
   EXPECT_FALSE(scene.lights[0].in_footage);
-  for (const char* name : {"shadowCatcher", "lightsFootage"}) {
+  EXPECT_FALSE(scene.lights[0].multiple_importance);
+  for (const char* name : {"shadowCatcher", "lightsFootage", "multipleImportance"}) {
     b.json["nodes"][0]["extensions"]["RELIEF_object"] = {{name, 1}};
     try {
       load(b);

@@ -239,7 +239,8 @@ def lights():
     area = {"shape": "disk", "radius": 2, "power": 10, "twoSided": True, "spread": 2}
     area["graph"] = {"nodes": [{"type": "texture-coordinate"}], "outputs": {"emission": {"node": 0, "output": "uv"}}}
     b.node(extensions={"RELIEF_area_light": area})
-    b.node(mesh=b.square(), extensions={"RELIEF_object": {"castsShadow": False, "causticCaster": "auto", "shadowCatcher": True, "lightsFootage": False}})
+    hidden = {"castsShadow": False, "shadowCatcher": True, "lightsFootage": False, "multipleImportance": False}
+    b.node(mesh=b.square(), extensions={"RELIEF_object": {**hidden, "causticCaster": "auto"}})
     return b
 
 

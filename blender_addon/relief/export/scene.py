@@ -245,9 +245,11 @@ class SceneExporter:
             if thing.kind == "geometry":
                 self._add_geometry(thing, key)
         self._stored.forget_unused()
-        for thing in things:
-            if thing.kind == "light":
-                self._add_lights(thing)
+        lights = [thing for thing in things if thing.kind == "light"]
+        # Cycles looks for lamps on no path, not even from the camera, unless there is one that bounced rays can meet.
+        are_met = any(compat.is_met_by_rays(thing.object.data) for thing in lights)
+        for thing in lights:
+            self._add_lights(thing, are_met)
 
     def _is_shown(self, thing):
         """Whether the view layer shows a thing; it may hide a part of it."""
@@ -488,7 +490,8 @@ class SceneExporter:
             exported = [(i, w if w.coordinates else replace(w, coordinates=_ACTIVE_UV)) for i, w in exported]
         return exported
 
-    def _add_lights(self, thing):
+    def _add_lights(self, thing, are_met):
+        """@param  are_met  whether rays meet any lamp at all"""
         original = thing.object
         light = original.evaluated_get(self._depsgraph).data
         matrices = thing.world_matrices()
@@ -505,7 +508,7 @@ class SceneExporter:
             place = Place(
                 node=node,
                 scale=tuple(np.abs(s).tolist()),
-                visible_to_camera=original.visible_camera,
+                visible_to_camera=original.visible_camera and are_met,
                 random=float(random),
                 writer=self.writer,
                 images=self._images,
@@ -514,10 +517,11 @@ class SceneExporter:
             export_light(light, place)
             if compat.links_light(original):
                 place.warn(*_LINKED)
-            unread.warn_unread_of_light(light, place.warn)
             settings = _ray_settings(original)
             if not original.relief.caustic_light:
                 settings["causticLight"] = False
+            if not compat.has_multiple_importance(light):
+                settings["multipleImportance"] = False
             if not thing.is_catcher:
                 settings["lightsFootage"] = False
             if original.lightgroup in self._light_groups:

@@ -26,10 +26,3 @@ def warn_unread_of_object(shown, scene, warn):
     modifier = compat.dicing_modifier(shown, scene)
     if modifier is not None and modifier.subdivision_type != "SIMPLE":
         warn("adaptive subdivision", f"its render level, {modifier.render_levels}, was used")
-
-
-def warn_unread_of_light(light, warn):
-    """Of a bpy light."""
-    # Without it, if all lamps are so, Cycles' rays do not find the lamp: mirrors and cameras do not see it.
-    if not getattr(getattr(light, "cycles", None), "use_multiple_importance_sampling", True):
-        warn("Multiple Importance switched off", "it was used")
