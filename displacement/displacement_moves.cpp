@@ -18,6 +18,9 @@ constexpr double kMostMovedCells = 16;
 /// it. Whoever divides a mesh so finely has it displaced at its vertices by every other renderer.
 constexpr double kMostMovedPixels = 2;
 
+/// Triangles of up to so many times that are divided, where surfaces may err by pixels: each into sixteen at most.
+constexpr double kMostHalved = 4;
+
 /// Sides of divided triangles, cells at most: lattices have powers of two, so they are one to two cells long. Of one cell and less
 /// there would be four times as many.
 constexpr double kDividedCells = 2;
@@ -50,6 +53,13 @@ bool map_may_move_vertices(const DisplacementSettings& settings, std::size_t num
   return !displacement_is_computed(settings) && !settings.divide && num_triangles >= kLeastMapTriangles;
 }
 
+namespace {
+
+/// How often the sides of a mesh's triangles are halved before its vertices move.
+int halvings(VertexMove move) { return move == VertexMove::kHalved ? 1 : move == VertexMove::kQuartered ? 2 : 0; }
+
+}  // namespace
+
 VertexMove DisplacementSet::vertex_move_of(const Use& use,
                                            const DisplacementOptions& options,
                                            std::vector<LatticeTriangle>* parts,
@@ -70,7 +80,7 @@ VertexMove DisplacementSet::vertex_move_of(const Use& use,
     reasons_.push_back(of + "its vertices are moved, as its heights are all the same");
     return VertexMove::kOwn;
   }
-  if (use.heights == nullptr) return map_move_of(use, options);
+  if (use.heights == nullptr) return map_move_of(use, options, used_bytes);
   if (use.heights->num_cells > 0) return VertexMove::kNone;
   const double cells = mean_cells_a_side(use.mesh, use.heights->cells);
   VertexMove move = is_dense(use.settings, use.mesh, cells) ? VertexMove::kOwn : VertexMove::kDivided;
@@ -111,31 +121,51 @@ VertexMove DisplacementSet::vertex_move_of(const Use& use,
   return move;
 }
 
-VertexMove DisplacementSet::map_move_of(const Use& use, const DisplacementOptions& options)
+VertexMove DisplacementSet::map_move_of(const Use& use, const DisplacementOptions& options, std::uint64_t* used_bytes)
 {
   if (!options.camera || options.picture_height <= 0 || lod_of(use.settings, options) > 0 ||
       !map_may_move_vertices(use.settings, use.mesh.num_triangles)) {
     return VertexMove::kNone;
   }
-  VertexMove* chosen = nullptr;
+  VertexMove of_this_picture = VertexMove::kNone;
+  VertexMove* chosen = &of_this_picture;
+  bool is_first = true;
+  std::uint64_t allowance = dicing_allowance(options);
   if (options.choices != nullptr) {
     const auto [known, is_new] =
         options.choices->moved.try_emplace({use.mesh_name, use.displacement_index, use.mesh.num_triangles, use.scale,
                                             options.error, 0, options.picture_height, 0},
                                            VertexMove::kNone);
     chosen = &known->second;
-    if (!is_new && *chosen == VertexMove::kNone) return VertexMove::kNone;
+    is_first = is_new;
+    if (is_new) allowance /= 2;
   }
+  if (!is_first && *chosen == VertexMove::kNone) return VertexMove::kNone;
   const SeenInstances seen(use.mesh, picture_view(use, options), use.places, SeenInstances::Coarser::kOutside);
   const double pixels = mean_pixels_a_side(use.mesh, seen) / static_cast<double>(use.settings.cell_pixels);
-  const bool was_moved = chosen != nullptr && *chosen == VertexMove::kOwn;
-  if (!was_moved && !(pixels <= (options.error > 0 ? options.error : kMostMovedPixels))) return VertexMove::kNone;
-  if (chosen != nullptr) *chosen = VertexMove::kOwn;
+  if (is_first) {
+    // Where surfaces may err, divided as finely as all else is.
+    const double most = options.error > 0 ? kDividedCells * options.error : kMostMovedPixels;
+    const bool may_halve = options.error > 0 && !use.has_borders;
+    *chosen = pixels <= most                                  ? VertexMove::kOwn
+              : may_halve && pixels <= kMostHalved / 2 * most ? VertexMove::kHalved
+              : may_halve && pixels <= kMostHalved * most     ? VertexMove::kQuartered
+                                                              : VertexMove::kNone;
+  }
+  const std::uint64_t bytes = halvings(*chosen) > 0 ? halved_mesh_bytes(use.mesh, halvings(*chosen)) : 0;
+  if (bytes > allowance - std::min(allowance, *used_bytes)) *chosen = VertexMove::kNone;
+  if (*chosen == VertexMove::kNone) return VertexMove::kNone;
+  *used_bytes += bytes;
   char text[96];
   std::snprintf(text, sizeof text, "its vertices are moved, as its triangles are %.2g pixels wide in the picture",
                 pixels);
-  reasons_.push_back("mesh '" + use.mesh_name + "': " + text);
-  return VertexMove::kOwn;
+  std::string reason = "mesh '" + use.mesh_name + "': " + text;
+  if (bytes > 0) {
+    std::snprintf(text, sizeof text, "; each is divided into %d, which takes ", 1 << 2 * halvings(*chosen));
+    reason += text + gibibytes(bytes);
+  }
+  reasons_.push_back(reason);
+  return *chosen;
 }
 
 bool DisplacementSet::fits_in_tiles(const Use& use,
@@ -234,8 +264,12 @@ MovedMesh DisplacementSet::make_moved(const Use& use, VertexMove move, std::span
   } else if (use.heights != nullptr) {
     moved = moved_mesh_make(use.mesh, use.heights->corners, by);
   } else {
-    const MapHeights map{&use.mesh, settings.height, &fields_->field(map_of(use), 0).bounds.view()};
-    moved = moved_mesh_make(use.mesh, corner_heights(map.source()), by);
+    MovedMesh halved;
+    if (halvings(move) > 0) halved = halved_mesh_make(use.mesh, halvings(move));
+    const MeshView mesh = halvings(move) > 0 ? halved.view(use.mesh) : use.mesh;
+    const MapHeights map{&mesh, settings.height, &fields_->field(map_of(use), 0).bounds.view()};
+    moved = moved_mesh_make(mesh, corner_heights(map.source()), by);
+    moved.divided = halved.divided;
   }
   moved.name = use.mesh_name;
   moved.mesh_index = use.mesh_index;

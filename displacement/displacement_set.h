@@ -65,9 +65,11 @@ struct DisplacementInput {
 
 /// Whose vertices displacement moves.
 enum class VertexMove : std::uint8_t {
-  kNone,    ///< rays are traced over the heights, or tiles of points
-  kOwn,     ///< the mesh's
-  kDivided  ///< those of triangles that its own are divided to
+  kNone,       ///< rays are traced over the heights, or tiles of points
+  kOwn,        ///< the mesh's
+  kHalved,     ///< likewise, and the middles of its triangles' sides
+  kQuartered,  ///< likewise, and the middles of the halves
+  kDivided     ///< those of triangles that its own are divided to
 };
 
 /// Which meshes of a sequence of pictures are diced or moved, decided where they are met first. What dicing takes and spares changes
@@ -230,7 +232,7 @@ class DisplacementSet {
                             std::vector<LatticeTriangle>* parts,
                             std::uint64_t* used_bytes);
   /// The same for a map: those of a dense mesh, or none.
-  VertexMove map_move_of(const Use& use, const DisplacementOptions& options);
+  VertexMove map_move_of(const Use& use, const DisplacementOptions& options, std::uint64_t* used_bytes);
   /// The same for vectors: where even tiles have no room, or the mesh deforms, triangles are larger.
   VertexMove vector_move_of(const Use& use,
                             const DisplacementOptions& options,

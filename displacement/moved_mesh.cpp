@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include <tbb/parallel_for.h>
 
@@ -212,6 +213,84 @@ struct DividedMesh {
     return triangles.size() * sizeof(TriangleIndices) + num_vertices * bytes_a_vertex(own);
   }
 };
+
+namespace {
+
+/// The sides of a mesh's triangles, those between the same two vertices as one.
+struct MeshSides {
+  std::vector<std::uint32_t> of_triangles;  ///< 3 · triangle + k: number of the side from its vertex k to the next
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> ends;
+
+  explicit MeshSides(const MeshView& mesh) : of_triangles(3 * std::size_t{mesh.num_triangles})
+  {
+    const auto ends_of = [&mesh](std::uint32_t side) {
+      const TriangleIndices& t = mesh.triangles[side / 3];
+      const std::uint32_t vertices[3] = {t.v0, t.v1, t.v2};
+      const std::uint32_t a = vertices[side % 3], b = vertices[(side + 1) % 3];
+      return std::pair{std::min(a, b), std::max(a, b)};
+    };
+    // Sorted by their lower vertices, by counting, and then by the others, of which there are few each.
+    const auto num_sides = static_cast<std::uint32_t>(of_triangles.size());
+    std::vector<std::uint32_t> first(std::size_t{mesh.num_vertices} + 1), sorted(num_sides);
+    for (std::uint32_t side = 0; side < num_sides; ++side) ++first[std::size_t{ends_of(side).first} + 1];
+    for (std::size_t vertex = 0; vertex < mesh.num_vertices; ++vertex) first[vertex + 1] += first[vertex];
+    std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
+    for (std::uint32_t side = 0; side < num_sides; ++side) sorted[next[ends_of(side).first]++] = side;
+    tbb::parallel_for(std::uint32_t{0}, mesh.num_vertices, [&](std::uint32_t vertex) {
+      std::sort(sorted.begin() + first[vertex], sorted.begin() + first[vertex + 1],
+                [&](std::uint32_t a, std::uint32_t b) {
+                  return std::pair{ends_of(a), a} < std::pair{ends_of(b), b};
+                });
+    });
+    for (const std::uint32_t side : sorted) {
+      if (const auto two = ends_of(side); ends.empty() || ends.back() != two) ends.push_back(two);
+      of_triangles[side] = static_cast<std::uint32_t>(ends.size() - 1);
+    }
+  }
+};
+
+MovedMesh halve(const MeshView& mesh)
+{
+  const MeshSides sides(mesh);
+  const auto divided = std::make_shared<DividedMesh>();
+  const std::size_t num_vertices = mesh.num_vertices + sides.ends.size();
+  divided->resize(mesh, num_vertices, 4 * std::size_t{mesh.num_triangles});
+  MovedMesh out;
+  out.P.resize(num_vertices);
+  out.N.resize(num_vertices);
+  tbb::parallel_for(std::size_t{0}, num_vertices, [&](std::size_t vertex) {
+    const auto own = static_cast<std::uint32_t>(vertex);
+    const bool is_new = vertex >= mesh.num_vertices;
+    const auto [a, b] = is_new ? sides.ends[vertex - mesh.num_vertices] : std::pair{own, own};
+    // The same from either end, so that the two sides of a cut of texture coordinates stay one place.
+    out.P[vertex] = is_new ? 0.5f * (mesh.P[a] + mesh.P[b]) : mesh.P[a];
+    out.N[vertex] = is_new ? as_normal(0.5f * (as_vector(mesh.N[a]) + as_vector(mesh.N[b]))) : mesh.N[a];
+    divided->interpolate(mesh, {a, b, b}, {is_new ? 0.5f : 0.0f, 0.0f}, vertex);
+  });
+  tbb::parallel_for(std::uint32_t{0}, mesh.num_triangles, [&](std::uint32_t triangle) {
+    const TriangleIndices& t = mesh.triangles[triangle];
+    const auto middle = [&](std::size_t k) {
+      return mesh.num_vertices + sides.of_triangles[3 * std::size_t{triangle} + k];
+    };
+    const std::uint32_t m0 = middle(0), m1 = middle(1), m2 = middle(2);
+    TriangleIndices* const four = divided->triangles.data() + 4 * std::size_t{triangle};
+    four[0] = {t.v0, m0, m2};
+    four[1] = {m0, m1, m2};
+    four[2] = {m0, t.v1, m1};
+    four[3] = {m2, m1, t.v2};
+  });
+  out.divided = divided;
+  return out;
+}
+
+}  // namespace
+
+MovedMesh halved_mesh_make(const MeshView& mesh, int times)
+{
+  MovedMesh out = halve(mesh);
+  for (int k = 1; k < times; ++k) out = halve(out.view(mesh));
+  return out;
+}
 
 CornerHeights corner_heights(const HeightSource& source)
 {
@@ -466,18 +545,39 @@ MovedMesh placed_mesh_make(const MeshView& mesh,
   return out;
 }
 
-std::uint64_t divided_mesh_bytes(const MeshView& mesh, std::span<const LatticeTriangle> parts)
+namespace {
+
+/// Of a divided mesh whose vertices are moved.
+std::uint64_t bytes_of(const MeshView& mesh, std::uint64_t vertices, std::uint64_t triangles)
 {
   // Twelve bytes of vertices' numbers, ten of quadrilaterals', and 57 that Embree's tree takes while it is built: 9.4 million triangles with
   // uv and tangents took a process 1.05 GB, where this says 1.16.
   constexpr std::uint64_t kTriangle = 80;
+  constexpr std::uint64_t kWhileMoving = 2 * (sizeof(Vec3f) + sizeof(Normal3f)) + 12;
+  return vertices * (kWhileMoving + DividedMesh::bytes_a_vertex(mesh)) + triangles * kTriangle;
+}
+
+}  // namespace
+
+std::uint64_t divided_mesh_bytes(const MeshView& mesh, std::span<const LatticeTriangle> parts)
+{
   std::uint64_t vertices = 0, triangles = 0;
   for (const LatticeTriangle& part : parts) {
     vertices += lattice_points(part.n);
     triangles += static_cast<std::uint64_t>(part.n) * static_cast<std::uint64_t>(part.n);
   }
-  constexpr std::uint64_t kWhileMoving = 2 * (sizeof(Vec3f) + sizeof(Normal3f)) + 12;
-  return vertices * (kWhileMoving + DividedMesh::bytes_a_vertex(mesh)) + triangles * kTriangle;
+  return bytes_of(mesh, vertices, triangles);
+}
+
+std::uint64_t halved_mesh_bytes(const MeshView& mesh, int times)
+{
+  // A triangle has one and a half sides of its own, each of which gets a vertex.
+  std::uint64_t vertices = mesh.num_vertices, triangles = mesh.num_triangles;
+  for (int k = 0; k < times; ++k) {
+    vertices += triangles + (triangles + 1) / 2;
+    triangles *= 4;
+  }
+  return bytes_of(mesh, vertices, triangles);
 }
 
 double mean_cells_a_side(const MeshView& mesh, const CellsAlong& cells)

@@ -189,6 +189,52 @@ TEST(MovedMesh, IsClosedWhereTrianglesAreDividedDifferently)
   }
 }
 
+/// Triangles in sixteen: vertices lie on the sides and faces, with what is linear over these; each edge has its like, also along a cut
+/// of texture coordinates; and what has a vertex in common still has.
+TEST(MovedMesh, HalvesSidesAndStaysClosed)
+{
+  Octahedron octahedron;
+  octahedron.P.push_back(octahedron.P[2]);
+  octahedron.N.push_back(octahedron.N[2]);
+  octahedron.uv.push_back(octahedron.uv[2]);
+  for (std::size_t t = 1; t < 3; ++t) octahedron.triangles[t].v2 = 6;
+  const MeshView mesh = octahedron.view();
+  const MovedMesh out = halved_mesh_make(mesh, 2);
+  const MeshView view = out.view(mesh);
+  ASSERT_EQ(view.num_triangles, 8u * 16);
+  // By Euler 66 places; the cut has two sides and an end.
+  ASSERT_EQ(view.num_vertices, 66u + 2 * 3 + 1);
+  std::map<std::array<float, 3>, Vec3f> normals;
+  for (std::uint32_t k = 0; k < view.num_vertices; ++k) {
+    const Vec3f P = view.P[k];
+    EXPECT_NEAR(std::abs(P.x) + std::abs(P.y) / 2 + std::abs(P.z) / 1.5f, 1, 1e-6);
+    EXPECT_NEAR(view.uv[0][k].x, P.x + 2 * P.y, 1e-6);
+    EXPECT_NEAR(view.uv[0][k].y, P.z, 1e-6);
+    EXPECT_LT(length(as_vector(view.N[k]) - P), 1e-6f);
+    const Vec3f first = normals.try_emplace({P.x, P.y, P.z}, as_vector(view.N[k])).first->second;
+    EXPECT_EQ(as_vector(view.N[k]), first);
+  }
+  EXPECT_EQ(normals.size(), 66u);
+  std::map<std::pair<std::array<float, 3>, std::array<float, 3>>, int> edges;
+  double volume = 0;
+  for (std::uint32_t k = 0; k < view.num_triangles; ++k) {
+    const TriangleIndices& t = view.triangles[k];
+    const Vec3f P[3] = {view.P[t.v0], view.P[t.v1], view.P[t.v2]};
+    for (int side = 0; side < 3; ++side) {
+      const Vec3f a = P[side], b = P[(side + 1) % 3];
+      ++edges[{{a.x, a.y, a.z}, {b.x, b.y, b.z}}];
+    }
+    const double part = dot(to_double(P[0]), cross(to_double(P[1]), to_double(P[2]))) / 6;
+    EXPECT_NEAR(part, 4.0 / (8 * 16), 1e-6);
+    volume += part;
+  }
+  EXPECT_NEAR(volume, 4, 1e-5);
+  for (const auto& [edge, count] : edges) {
+    EXPECT_EQ(count, 1);
+    EXPECT_EQ(edges.count({edge.second, edge.first}), 1u);
+  }
+}
+
 /// Where vectors bring a point: a turn about z that grows with the height, with overhangs.
 Vec3d turned(const Vec3d& P)
 {

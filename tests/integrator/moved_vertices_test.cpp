@@ -157,7 +157,7 @@ TEST(MovedVertices, AreThoseOfTheMeshWhereTrianglesUnderAMapAreSmall)
   EXPECT_TRUE(is_exact(scene, named));
   without_picture.camera.reset();
   EXPECT_TRUE(is_exact(scene, without_picture));
-  diced.error = 0.5;
+  diced.error = 0.05;
   EXPECT_EQ(SceneContext(scene, diced).displacements.moved().size(), 0u);
   diced.error = 1;
   EXPECT_EQ(SceneContext(scene, diced).displacements.moved().size(), 1u);
@@ -173,6 +173,30 @@ TEST(MovedVertices, AreThoseOfTheMeshWhereTrianglesUnderAMapAreSmall)
   }
   scene.displacements[0].divide = true;
   EXPECT_TRUE(is_exact(scene, options));
+}
+
+/// Larger ones are divided into four or sixteen where surfaces may err by pixels: to cells of two of these.
+TEST(MovedVertices, UnderAMapAreThoseOfHalvedSidesWhereItMayErr)
+{
+  constexpr int kQuads = 80;
+  const Scene scene = mapped_square(kQuads);
+  DisplacementOptions options = options_of(scene, 90);
+  for (const auto& [error, halves] : {std::pair{0.25f, 2}, {0.12f, 4}}) {
+    options.error = error;
+    const SceneContext context(scene, options);
+    EXPECT_EQ(num_moved_triangles(context), static_cast<std::size_t>(2 * kQuads * kQuads * halves * halves));
+    EXPECT_LT(farthest_from(context, heights_at_vertices(halves * kQuads, kTiledWaves)), 1e-5);
+    DisplacementOptions without_room = options;
+    without_room.auto_bytes = 1;
+    EXPECT_EQ(SceneContext(scene, without_room).displacements.moved().size(), 0u);
+    // What the first picture of a sequence has the others have.
+    DisplacementOptions sequence = options;
+    sequence.choices = std::make_shared<DicingChoices>();
+    for (const float z : {5.0f, 3.0f}) {
+      sequence.camera->world_from_camera.p.z = z;
+      EXPECT_EQ(num_moved_triangles(SceneContext(scene, sequence)), num_moved_triangles(context));
+    }
+  }
 }
 
 /// What is kept for the next picture stays where the camera moves, and is made anew for a picture of another height.
